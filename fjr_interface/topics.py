@@ -1,0 +1,67 @@
+"""Names, types and time stamps of the rig's topics (no ROS import)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+NAMESPACE = "/rig"
+JOINT = "joint"
+JOINT_STATE = "sensor_msgs/msg/JointState"
+STRING = "std_msgs/msg/String"
+
+SIGNAL_DEPTH = 2000
+"""History depth of the signal topics: more than a streamed window, so that no reader loses one."""
+
+Field = Literal["position", "velocity", "effort"]
+
+
+@dataclass(frozen=True)
+class Signal:
+    """One recorded signal: its short symbol, topic below the namespace, field and unit."""
+
+    symbol: str
+    topic: str
+    field: Field
+    unit: str
+
+    @property
+    def absolute_topic(self) -> str:
+        """The topic in the default namespace, as it stands in a bag."""
+        return f"{NAMESPACE}/{self.topic}"
+
+
+REFERENCE = Signal("r", "reference", "position", "rad")
+MOTOR_POSITION = Signal("y", "motor_position", "position", "rad")
+MOTOR_TORQUE = Signal("u", "motor_torque", "effort", "N m")
+LINK_POSITION = Signal("q", "link_position", "position", "rad")
+SIGNALS = (REFERENCE, MOTOR_POSITION, MOTOR_TORQUE)
+"""The three signals of every bag, in the order in which a sample is recorded."""
+
+EXPERIMENT_TOPIC = "experiment"
+CONTROLLER_TOPIC = "controller"
+"""Latched JSON: the `controller` entry of the experiment description, by the controller itself."""
+
+STREAM_KEY = "reference_stream"
+"""Number in that JSON, another one for each stream of references that the controller has begun. It
+is not part of the experiment description; a controller that can't give it leaves it out."""
+
+MODE_KEY = "mode"
+"""Mode of the controller node in that JSON, lockstep or realtime: the drive must have the same. It
+is not part of the experiment description either."""
+
+RECORDED_TOPIC = "recorded"
+"""Stamp up to which a recorder has everything; the excitation never streams further than a window
+beyond it, so a slow recorder slows the lockstep instead of losing samples."""
+
+
+def stamp_ns(sample: int, sample_rate_hz: float) -> int:
+    """Return the stamp of sample k = 1, 2, ...: the instant k Ts in integer nanoseconds."""
+    return round(sample * 1e9 / sample_rate_hz)
+
+
+def stamps_ns(samples: int, sample_rate_hz: float) -> np.ndarray:
+    """Return the stamps of samples 1..samples as int64 of shape (samples,), equal to `stamp_ns`."""
+    return np.rint(np.arange(1, samples + 1) * 1e9 / sample_rate_hz).astype(np.int64)
