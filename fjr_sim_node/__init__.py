@@ -1,0 +1,1 @@
+"""Simulator: the flexible-joint plant, its closed-loop batch simulation, and the node."""

@@ -1,0 +1,255 @@
+"""ROS node of the simulated rig: the lockstep's pace maker, or a drive on the steady clock."""
+
+from __future__ import annotations
+
+import struct
+import time
+
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+
+from fjr_interface import ros, topics
+from fjr_interface.errors import InputError
+from fjr_interface.experiment import Experiment, controller_from_json
+from fjr_interface.health import OK, WARN, Health, Speed
+from fjr_interface.joint_state import JointStateReader, JointStateWriter, LayoutError
+from fjr_interface.parameters import ParameterGroup
+from fjr_interface.real_time import LOCKSTEP, MODE_PARAMETER, NEVER, REAL_TIME, keep_pauses_out
+
+from . import effects, faults, plant, rig, services
+from .control import SPEED, STEPS, SimulationControl, State
+from .desk import Desk
+from .lockstep import LockstepDrive
+from .real_time import TORQUE_TIMEOUT, RealTimeDrive
+from .simulator import SIMULATOR
+
+PARAMETERS = ParameterGroup(
+    *SIMULATOR,
+    MODE_PARAMETER,
+    SPEED,
+    STEPS,
+    TORQUE_TIMEOUT,
+    *faults.PARAMETERS,
+    ros.JOINT_PARAMETER,
+    ros.readers_parameter("controller"),
+)
+
+_LOOK_SAMPLES = 100  # between two looks for subscribers of link_position
+_CLOCK = struct.Struct("<4siI")
+_CDR = b"\x00\x01\x00\x00"
+
+
+class SimulatorNode(ros.RigNode):
+    """Simulated drive: publishes y and /clock, holds the torque that answers, steps the plant.
+
+    Each experiment description starts one realization: plant at rest, noise seeded anew, parameters
+    read anew, time from one sample period. In lockstep a sample waits for the torque of the one
+    before and for simulation control; in real time samples come by the steady clock.
+    """
+
+    def __init__(self) -> None:
+        """Create publishers, subscriptions and the services of simulation control."""
+        super().__init__("simulator", PARAMETERS)
+        joint = self.values["joint"]
+        self._encode = JointStateWriter("position", joint).encode
+        self._decode = JointStateReader("effort").decode
+        self.real_time = self.values["mode"] == REAL_TIME
+        self.control = SimulationControl()
+        self._experiment: Experiment | None = None
+        self._lockstep: LockstepDrive | None = None
+        self._drive: RealTimeDrive | None = None
+        self._read_fault()
+        self._running = self._publish_link = False
+        self._speed = Speed()
+        self._ticks = self.create_publisher(Clock, "/clock", ros.CLOCK_QOS)
+        self._position = self.create_publisher(
+            JointState, topics.MOTOR_POSITION.topic, ros.SIGNAL_QOS
+        )
+        self._link = self.create_publisher(JointState, topics.LINK_POSITION.topic, ros.SIGNAL_QOS)
+        self._torque = self.create_subscription(
+            JointState,
+            topics.MOTOR_TORQUE.topic,
+            self._on_torque_in_real_time if self.real_time else self._on_torque,
+            ros.SIGNAL_QOS,
+            raw=True,
+        )
+        self.create_subscription(
+            String, topics.EXPERIMENT_TOPIC, self._on_experiment, ros.EXPERIMENT_QOS
+        )
+        self.create_subscription(
+            String, topics.CONTROLLER_TOPIC, self._on_controller, ros.EXPERIMENT_QOS
+        )
+        self._restart = self.create_client(Trigger, "excitation/start")
+        self._desk = Desk(self)
+        services.offer(self, self._desk)
+        self.values_changed()
+        compiled = plant.coefficients(self.values), effects.coefficients(self.values)
+        rig.hold(rig.at_rest(), 0.0, 1e-3, *compiled)  # compiles it
+
+    def _on_controller(self, message: String) -> None:
+        own = REAL_TIME if self.real_time else LOCKSTEP
+        mode = controller_from_json(message.data).get(topics.MODE_KEY, own)
+        if mode != own:
+            raise InputError(
+                f"The controller has mode {mode}, the simulator {own}; give both the same."
+            )
+
+    def _on_experiment(self, message: String) -> None:
+        experiment = Experiment.from_json(message.data, "topic experiment")
+        rate = self.values["sample_rate_hz"]
+        if experiment.sample_rate_hz != rate:
+            raise InputError(
+                f"The experiment has sample_rate_hz {experiment.sample_rate_hz:g}, the simulator "
+                f"{rate:g}; give both the same."
+            )
+        self.drop_run()
+        self._experiment = experiment
+        if self.real_time:
+            self._drive = RealTimeDrive(self.values, experiment)
+            self._in, self._out = faults.wires(self._read_fault(), self.values["fault_seed"])
+        else:
+            self._lockstep = LockstepDrive(self.values, experiment)
+        self.wait_until(self._lacking, self._begin)
+
+    def _read_fault(self) -> faults.FaultPlan | None:
+        plan = faults.FaultPlan.parse(self.values["fault"])
+        if plan is not None and not self.real_time:
+            raise InputError("fault is for mode realtime; a lockstep has none.")
+        return plan
+
+    def _lacking(self) -> str | None:
+        if self.real_time and self.control.state == State.STOPPED:
+            return "play: the simulation is stopped"
+        return self.unread(self._position) or self.unwritten(self._torque)
+
+    def _begin(self) -> None:
+        self.get_logger().info(f"{self.run}.".capitalize())
+        self._running = True
+        self._publish_link = self._link.get_subscription_count() > 0
+        if self._drive is None:
+            self.go_on()
+            return
+        keep_pauses_out()
+        self._drive.start(time.monotonic_ns())
+        self.due_ns = self._drive.due_ns
+
+    @property
+    def run(self) -> str | None:
+        """The realization under way and how far it is, in words; None without one."""
+        experiment, drive = self._experiment, self._drive or self._lockstep
+        if experiment is None or drive is None:
+            return None
+        return (
+            f"level {experiment.level}, realization {experiment.realization}: {drive.samples} of "
+            f"{drive.total} samples"
+        )
+
+    def drop_run(self) -> None:
+        """Give the realization under way up: plant at rest, nothing published."""
+        self.stop_waiting()
+        self._running, self._experiment = False, None
+        self._lockstep = self._drive = None
+        self.due_ns = NEVER
+
+    def start_anew(self) -> None:
+        """Ask the excitation for its realization from the beginning."""
+        if not self._restart.service_is_ready():
+            raise InputError(
+                f"Nobody offers {self._restart.srv_name}; start the excitation node first."
+            )
+        self._restart.call_async(Trigger.Request())
+
+    def values_changed(self) -> None:
+        """Go on at the speed that is set now."""
+        self.control.set_speed(self.values["speed"])
+        self.go_on()
+
+    def go_on(self) -> None:
+        """Play the next sample of a lockstep if it may be played now; else wait until it may."""
+        drive = self._lockstep
+        if not self._running or drive is None or drive.stamp:
+            return
+        now_ns = time.monotonic_ns()
+        self.due_ns = self.control.next_ns(now_ns, drive.next_stamp)
+        if self.due_ns <= now_ns:
+            self.due_ns = NEVER
+            self._publish_sample(drive)
+
+    def _publish_sample(self, drive: LockstepDrive) -> None:
+        self.control.begin_sample()
+        position = drive.measure()
+        self._publish_position(drive.stamp, position)
+        if drive.samples % _LOOK_SAMPLES == 0:
+            self._publish_link = self._link.get_subscription_count() > 0
+        if self._publish_link:
+            self._link.publish(self._encode(drive.stamp, drive.link))
+
+    def _publish_position(self, stamp: int, position: float) -> None:
+        self._position.publish(self._encode(stamp, position))
+        self._ticks.publish(_CLOCK.pack(_CDR, *divmod(stamp, 1_000_000_000)))
+
+    def _on_torque(self, message: bytes) -> None:
+        stamp, torque = self._decoded(message)
+        drive = self._lockstep
+        if drive is None or stamp != drive.stamp:
+            return  # a late answer to a run that was replaced
+        drive.hold(torque)
+        if self.control.free and not drive.over:
+            self._publish_sample(drive)
+            return
+        if drive.over:
+            self.drop_run()
+        if drive.over or not self.control.stepping:
+            self._desk.steps_over(done=not self.control.stepping)
+        self.go_on()
+
+    def _decoded(self, message: bytes) -> tuple[int, float]:
+        try:
+            return self._decode(message)
+        except LayoutError as error:
+            raise InputError(f"Topic motor_torque: {error}; publish one effort.") from None
+
+    def _on_torque_in_real_time(self, message: bytes) -> None:
+        if self._drive is not None:
+            now_ns = time.monotonic_ns()
+            self._in.put(now_ns, *self._decoded(message))
+            self.on_time(now_ns)
+
+    def on_time(self, now_ns: int) -> None:
+        """Play what is due: a sample of the lockstep, or whatever the drive in real time has."""
+        if (drive := self._drive) is None:
+            self.go_on()
+            return
+        for stamp, position, link in drive.measure(now_ns):
+            self._out.put(now_ns, stamp, position)
+            if self._publish_link:
+                self._link.publish(self._encode(stamp, link))
+        for stamp, position in self._out.take(now_ns):
+            self._publish_position(stamp, position)
+        for stamp, torque in self._in.take(now_ns):
+            drive.command(now_ns, stamp, torque)
+        self.due_ns = min(drive.due_ns, self._in.next_ns, self._out.next_ns)
+        if drive.over and self.due_ns == NEVER:
+            self.drop_run()
+            self.get_logger().info(drive.describe())
+
+    def health(self) -> Health:
+        """Return speed, sticking and, in real time, the lateness of the run."""
+        drive = self._drive or self._lockstep
+        figures = {} if drive is None else drive.figures()
+        bad = self._drive is not None and self._drive.troubled
+        speed = self._speed.look(drive.samples if drive else 0, self.values["sample_rate_hz"])
+        values = {"mode": self.values["mode"], "speed (x real time)": speed, **figures}
+        return Health(WARN if bad else OK, self._desk.status(), values)
+
+    def owed(self) -> str | None:
+        """Return the torque that the simulated drive waits for."""
+        drive = self._lockstep
+        return f"the torque of {drive.stamp * 1e-9:.6f} s" if drive and drive.stamp else None
+
+
+def main() -> int:
+    """Run the node; the console script `fjr_sim_node`."""
+    return ros.run(SimulatorNode)

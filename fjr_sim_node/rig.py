@@ -1,0 +1,97 @@
+"""The simulated rig, one sample at a time: drive, plant, encoder, in one compiled step.
+
+The node and the batch simulation call the same two functions: `measure`, then `hold`.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from fjr_interface.compiled import inlined, jit
+
+from . import effects as fx
+from .plant import advance, advance_with_effects
+from .torques import FS, FSM, FV, FVM, JM, K0, K1, J
+
+LINK, MOTOR = 0, 2
+"""Where link and motor position (rad) stand in a rig's state."""
+
+_TIME, _HEAD, _RING = 10, 11, 12
+_RING_SIZE = 2048
+
+
+def at_rest(elapsed_s: float = 0.0) -> np.ndarray:
+    """Return the state of a rig at rest.
+
+    Args:
+        elapsed_s: time since the rig was switched on, for what drifts.
+    """
+    state = np.zeros(_RING + _RING_SIZE)
+    state[_TIME] = elapsed_s
+    return state
+
+
+@jit
+def measure(x, noise, e):
+    """Return what the encoder reads (rad): the motor position with noise and its own errors."""
+    y = x[MOTOR]
+    if e is None:
+        return y + noise
+    if e[fx.ECCENTRICITY] != 0.0:
+        y += e[fx.ECCENTRICITY] * math.sin(y + e[fx.ECCENTRICITY_PHASE])
+    y += noise
+    if e[fx.RESOLUTION] != 0.0:
+        y = e[fx.RESOLUTION] * np.rint(y / e[fx.RESOLUTION])
+    return y
+
+
+@inlined
+def _scaled_friction(p, factor):
+    """Return the bare parameters with all friction multiplied by a factor."""
+    return (
+        p[JM],
+        p[J],
+        factor * p[FS],
+        factor * p[FSM],
+        factor * p[FV],
+        factor * p[FVM],
+        p[K0],
+        p[K1],
+    )
+
+
+@jit
+def hold(x, command, sample_period, p, e):
+    """Advance the rig in place by one sample period under a held torque command.
+
+    Args:
+        x: state from `at_rest`.
+        command: commanded torque u (N m).
+        sample_period: Ts (s).
+        p: bare parameters, `plant.coefficients`.
+        e: effects, `effects.coefficients`, or None.
+    """
+    if e is None:
+        x[0], x[1], x[2], x[3] = advance(x[0], x[1], x[2], x[3], command, sample_period, p)
+        return
+    limit = e[fx.SATURATION]
+    torque = min(max(command, -limit), limit) * (1.0 + e[fx.GAIN_ERROR])
+    if e[fx.DRIFT] != 0.0:
+        p = _scaled_friction(p, max(1.0 + e[fx.DRIFT] * x[_TIME], 0.0))
+    x[_TIME] += sample_period
+    if e[fx.DELAY] == 0.0:
+        advance_with_effects(x, torque, sample_period, p, e)
+        return
+    head = (int(x[_HEAD]) + 1) % _RING_SIZE
+    x[_HEAD] = head
+    x[_RING + head] = torque
+    samples = e[fx.DELAY] / sample_period
+    whole = int(samples + 1e-9)  # a delay of whole samples is that, whatever its last bit
+    before = x[_RING + (head - whole - 1) % _RING_SIZE]
+    now = x[_RING + (head - whole) % _RING_SIZE]
+    late = max(samples - whole, 0.0) * sample_period
+    if late > 0.0:
+        advance_with_effects(x, before, late, p, e)
+    advance_with_effects(x, now, sample_period - late, p, e)
