@@ -1,0 +1,1 @@
+"""Controller: the filtered PD law, and the node that runs it."""

@@ -1,0 +1,188 @@
+"""ROS node of the excitation: describes the experiment and streams its reference ahead of time."""
+
+from __future__ import annotations
+
+import struct
+from typing import Any
+
+import numpy as np
+from builtin_interfaces.msg import Time
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+
+from fjr_interface import ros, topics
+from fjr_interface.errors import InputError
+from fjr_interface.experiment import Experiment, controller_from_json
+from fjr_interface.health import Health
+from fjr_interface.joint_state import JointStateWriter
+from fjr_interface.parameters import Parameter, ParameterGroup
+
+from . import multisine
+
+STREAM = ParameterGroup(
+    Parameter("autostart", True, "", "Play as soon as all is there, without the start service"),
+    Parameter(
+        "pace",
+        "clock",
+        "",
+        "What the stream must not outrun by more than the window: simulated time, what a recorder "
+        "has recorded, or the positions of a drive that publishes no clock",
+        choices=("clock", "recorded", "position"),
+    ),
+    Parameter("window", 1000, "", "Samples streamed ahead", 10, topics.SIGNAL_DEPTH // 2),
+    Parameter(
+        "describe_controller",
+        True,
+        "",
+        "Wait for the controller's description of itself; false for a controller that gives none",
+    ),
+    ros.JOINT_PARAMETER,
+    ros.readers_parameter("controller"),
+)
+"""How a reference is streamed, whatever it is."""
+
+PARAMETERS = ParameterGroup(
+    *multisine.EXCITATION,
+    Parameter("level", 0, "", "Level to play, an index into amplitudes_rad", 0, 100_000),
+    Parameter("realization", 0, "", "Realization to play", 0, 100_000),
+    *STREAM,
+)
+
+_PACES = {
+    "clock": (Clock, "/clock", ros.CLOCK_QOS),
+    "recorded": (Time, topics.RECORDED_TOPIC, ros.EXPERIMENT_QOS),
+    "position": (JointState, topics.MOTOR_POSITION.topic, ros.SIGNAL_QOS),
+}
+_TIME = struct.Struct("<4xiI")  # with this begins the CDR of all three
+
+
+class ExcitationNode(ros.RigNode):
+    """Plays one realization at a time; `start` (std_srvs/Trigger) plays the one set by parameters.
+
+    It streams r, at most `window` samples ahead of the pace, and describes the experiment, which
+    makes the simulator start, as soon as the controller has taken the new reference.
+    """
+
+    def __init__(self, group: ParameterGroup = PARAMETERS) -> None:
+        """Create publishers, the pace subscription and the start service."""
+        super().__init__("excitation", group)
+        self._encode = JointStateWriter("position", self.values["joint"]).encode_many
+        self._reference = self.create_publisher(JointState, topics.REFERENCE.topic, ros.SIGNAL_QOS)
+        self._description = self.create_publisher(
+            String, topics.EXPERIMENT_TOPIC, ros.EXPERIMENT_QOS
+        )
+        self._stamps = np.empty(0, np.int64)
+        self._sent = 0
+        self._sent_ns = self._due_ns = 0
+        self._controller: dict[str, Any] | None = None
+        self._stream_taken: int | None = None
+        self._untaken = False
+        self._played: Experiment | None = None
+        message_type, topic, qos = _PACES[self.values["pace"]]
+        self.create_subscription(message_type, topic, self._on_pace, qos, raw=True)
+        self.create_subscription(
+            String, topics.CONTROLLER_TOPIC, self._on_controller, ros.EXPERIMENT_QOS
+        )
+        self.create_service(Trigger, "~/start", self._on_start)
+        if self.values["autostart"]:
+            self._prepare()
+
+    def _on_pace(self, message: bytes) -> None:
+        seconds, nanoseconds = _TIME.unpack_from(message)
+        passed_ns = seconds * 1_000_000_000 + nanoseconds
+        # A time beyond what was sent is an earlier realization's, and no pace for this one.
+        if self._due_ns <= passed_ns <= self._sent_ns:
+            self._stream(passed_ns)
+
+    def _on_controller(self, message: String) -> None:
+        description = controller_from_json(message.data)
+        taken = description.pop(topics.STREAM_KEY, None)
+        description.pop(topics.MODE_KEY, None)
+        if taken is None or taken != self._stream_taken:
+            self._untaken = False
+        self._controller, self._stream_taken = description, taken
+
+    def _on_start(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        try:
+            experiment = self._prepare()
+        except InputError as error:
+            response.success, response.message = False, str(error)
+            return response
+        response.success = True
+        response.message = f"level {experiment.level}, realization {experiment.realization}"
+        return response
+
+    def _describe(self) -> Experiment:
+        return multisine.describe(
+            self.values, self.values["level"], self.values["realization"], self._controller
+        )
+
+    def _signal(self, experiment: Experiment) -> np.ndarray:
+        """Return the reference of an experiment, float64 of shape (samples,) in rad."""
+        return multisine.reference(experiment)
+
+    def _prepare(self) -> Experiment:
+        """Check the request, then wait for the peers and begin; return what will be played."""
+        self._played = experiment = self._describe()
+        self._stamps = np.empty(0, np.int64)
+        self.wait_until(self._lacking, self._begin)
+        return experiment
+
+    def _lacking(self) -> str | None:
+        if missing := self.unread(self._reference) or self._untaken_by():
+            return missing
+        if self._description.get_subscription_count() < 1:
+            return f"a subscriber of {self._description.topic_name}"
+        if self._controller is None and self.values["describe_controller"]:
+            return "the controller's description on topic controller"
+        return None
+
+    def _untaken_by(self) -> str | None:
+        return "the controller to take the reference" if self._untaken else None
+
+    def _begin(self) -> None:
+        experiment = self._describe()
+        self._samples = self._signal(experiment)
+        self._stamps = experiment.stamps_ns
+        self._window_ns = topics.stamp_ns(self.values["window"], experiment.sample_rate_hz)
+        self._chunk = max(1, self.values["window"] // 4)
+        self._sent = 0
+        self._untaken = self._stream_taken is not None
+        self._stream(0)
+        # The description makes the simulator start: never before the controller has left the old
+        # reference, or it would answer the first position with that.
+        description = String(data=experiment.to_json())
+        self.wait_until(self._untaken_by, lambda: self._description.publish(description))
+
+    def health(self) -> Health:
+        """Return how much of the reference is streamed."""
+        if self._played is None:
+            return Health(summary="waiting to be started")
+        what = f"level {self._played.level}, realization {self._played.realization}"
+        if not self._stamps.size:
+            return Health(summary=f"waiting to play {what}")
+        return Health(
+            summary=f"playing {what}",
+            values={"samples streamed": self._sent, "samples": int(self._stamps.size)},
+        )
+
+    def _stream(self, passed_ns: int) -> None:
+        """Publish what lies within the window beyond the pace, in whole chunks."""
+        total = self._stamps.size
+        while self._sent < total:
+            end = min(self._sent + self._chunk, total)
+            self._due_ns = int(self._stamps[end - 1]) - self._window_ns
+            if passed_ns < self._due_ns:
+                return
+            part = slice(self._sent, end)
+            for message in self._encode(self._stamps[part], self._samples[part]):
+                self._reference.publish(message.tobytes())
+            self._sent, self._sent_ns = end, int(self._stamps[end - 1])
+        self._due_ns = self._sent_ns + 1
+
+
+def main() -> int:
+    """Run the node; the console script `excitation_node`."""
+    return ros.run(ExcitationNode)
