@@ -1,0 +1,1 @@
+"""The blind check: cases from a second plant, sealed answers, committed verdicts, scores."""

@@ -1,0 +1,86 @@
+"""Calibrates the confidence: `python -m gap_diagnosis.blind.calibrate FOLDER...`.
+
+Each folder is a finished blind check of the method `fjr` whose seed is for training only, such as
+
+    fjr blind run --cases 60 --seed 100 --method fjr --out training/100
+
+It prints the table for `gap_diagnosis.confidence` with what it rests on. Each group has a logistic
+regression with a Gaussian prior, so that few misses do not make a verdict certain; the expected
+calibration error is that of leaving each case out in turn.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+import numpy as np
+from scipy.optimize import minimize
+
+from ..confidence import COEFFICIENTS, NAMES, Group, features, group
+from ..diagnosis import Diagnosis
+from .outcome import Outcome
+from .run import BlindCheck
+from .score import calibration_error
+
+_MEAN, _STD = 2.0, 1.5  # prior of the intercept: 88 % right
+_SLOPE_STD = 1.0
+
+Case = tuple[Diagnosis, bool]
+"""A diagnosis, and whether its verdict was right."""
+
+
+def cases_of(folder: Path) -> list[Case]:
+    """Return the diagnoses of a finished check by the project's own method, beside the truth."""
+    check = BlindCheck.open(folder)
+    answers = check.unseal()
+    outcomes = [
+        Outcome.of(answers[index], values)
+        for (method, index), values in check.read_verdicts().items()
+        if method == check.methods[0]
+    ]
+    return [(o.diagnosis, o.right) for o in outcomes if o.diagnosis is not None]
+
+
+def calibrated(cases: Sequence[Case]) -> dict[Group, tuple[float, ...]]:
+    """Return the coefficients of every group."""
+    return {kind: _fitted(kind, [c for c in cases if group(c[0]) == kind]) for kind in COEFFICIENTS}
+
+
+def _fitted(kind: Group, cases: Sequence[Case]) -> tuple[float, ...]:
+    size = len(NAMES[kind])
+    mean = np.array([_MEAN] + [0.0] * (size - 1))
+    std = np.array([_STD] + [_SLOPE_STD] * (size - 1))
+    x = np.array([features(diagnosis) for diagnosis, _ in cases]).reshape(-1, size)
+    sign = np.array([1.0 if right else -1.0 for _, right in cases])
+
+    def cost(beta: np.ndarray) -> float:
+        prior = 0.5 * float(np.sum(((beta - mean) / std) ** 2))
+        return prior + float(np.sum(np.logaddexp(0.0, -sign * (x @ beta))))
+
+    return tuple(round(float(b), 3) for b in minimize(cost, mean).x)
+
+
+def left_out(cases: Sequence[Case]) -> list[tuple[float, bool]]:
+    """Return (confidence, right) of each case by a calibration on all the others."""
+    pairs = []
+    for index, (diagnosis, right) in enumerate(cases):
+        kind = group(diagnosis)
+        others = [c for i, c in enumerate(cases) if i != index and group(c[0]) == kind]
+        score = float(np.dot(_fitted(kind, others), features(diagnosis)))
+        pairs.append((1.0 / (1.0 + np.exp(-score)), right))
+    return pairs
+
+
+def summary(cases: Sequence[Case]) -> Iterable[str]:
+    """Yield the lines of the table."""
+    for kind, beta in calibrated(cases).items():
+        mine = [right for diagnosis, right in cases if group(diagnosis) == kind]
+        yield f'    "{kind}": {beta},  # {sum(mine)} of {len(mine)} right'
+    yield f"calibration error, each case left out: {calibration_error(left_out(cases)):.3f}"
+
+
+if __name__ == "__main__":
+    for line in summary([case for folder in sys.argv[1:] for case in cases_of(Path(folder))]):
+        print(line)

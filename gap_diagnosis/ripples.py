@@ -1,0 +1,142 @@
+"""Which ripples over the motor angle could explain what a model leaves: hundreds at once.
+
+A ripple acts as a torque on the motor. What it does to the position is predicted linearly: the
+torque along the model's own motion, times the response of the closed loop to a torque,
+Y/(R C) = G/(1 + G C), which the model's simulation gives at the excited lines. Only the best go on
+to be simulated, so that this may be rough.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from controller_node.transfer_function import as_transfer_function, law_of
+
+from .least_squares import Solution
+from .misfit import Misfit
+from .model import Model, Simulator
+from .records import RecordedExperiment, spectrum
+
+RIPPLES = ("position_friction", "kinematic_error", "cogging")
+"""Effects that are periodic in the motor angle."""
+CYCLES = np.concatenate([np.arange(0.5, 4.0, 0.25), np.arange(4.0, 40.0, 0.5), np.arange(40, 231)])
+"""Numbers of ripples per turn that are looked at; between them the response hardly changes."""
+
+
+@dataclass(frozen=True)
+class _Motion:
+    """One period of a model's motion, (realizations, N) each, and the loop's response to torque.
+
+    Attributes:
+        motor, velocity, transmitted: rad, rad/s, N m.
+        response: complex (realizations, lines), position per torque on the motor, rad/(N m).
+        both: the same of a torque between link and motor.
+    """
+
+    motor: np.ndarray
+    velocity: np.ndarray
+    transmitted: np.ndarray
+    response: np.ndarray
+    both: np.ndarray
+
+
+def best_cycles(
+    effect: str,
+    recorded: RecordedExperiment,
+    simulator: Simulator,
+    misfit: Misfit,
+    model: Model,
+    parent: Solution,
+    most: int,
+) -> list[float]:
+    """Return the numbers of cycles per turn that promise most, best first.
+
+    Args:
+        effect: one of RIPPLES.
+        recorded: the experiment; its loop can be repeated.
+        simulator: repeats it.
+        misfit: of the realizations that count.
+        model: the parent's model.
+        parent: where the parent's fit ended.
+        most: how many to return, each a maximum of its own.
+    """
+    motion = _motion(recorded, simulator, misfit, model)
+    basis = np.linalg.qr(parent.jacobian)[0]
+    left = parent.residuals - basis @ (basis.T @ parent.residuals)
+    gains = np.array([_gain(effect, cycles, motion, model.plant, misfit, basis, left)
+                      for cycles in CYCLES])  # fmt: skip
+    padded = np.concatenate([[-1.0], gains, [-1.0]])
+    peaks = np.flatnonzero((gains >= padded[:-2]) & (gains > padded[2:]))
+    return [float(CYCLES[i]) for i in peaks[np.argsort(-gains[peaks])][:most]]
+
+
+def _motion(
+    recorded: RecordedExperiment, simulator: Simulator, misfit: Misfit, model: Model
+) -> _Motion:
+    description = recorded.experiment
+    y, _, q = simulator.motion(model, misfit.which)
+    lines = np.arange(recorded.lines)
+    excited = np.array(description.excited_harmonics)
+    z = np.exp(2j * np.pi * lines / description.samples_per_period)
+    law = as_transfer_function(law_of(description.controller, description.sample_rate_hz))
+    powers = z[:, None] ** -np.arange(law.numerator.size)
+    controller = (powers @ law.numerator) / (powers @ law.denominator)
+    r = [recorded.realizations[i].reference[-1] for i in misfit.which]
+    loop = spectrum(y, lines.size) / (spectrum(np.array(r), lines.size) + 1e-300)
+    response = np.array([_between(lines, excited, row[excited]) for row in loop]) / controller
+    p, s = model.plant, 2j * np.pi * lines * description.base_frequency_hz
+    twist = q - y
+    return _Motion(
+        motor=y,
+        velocity=np.gradient(y, axis=1) * description.sample_rate_hz,
+        transmitted=p.get("k0", 0.0) * twist,
+        response=response,
+        both=response * _of_pair(p, s),
+    )
+
+
+def _of_pair(p: Mapping[str, float], s: np.ndarray) -> np.ndarray:
+    """Return the motor torque that acts as 1 N m on the motor against the link does."""
+    if "k0" not in p:
+        return np.ones(s.size)
+    free = p["j"] * s**2 + p["fv"] * s
+    return free / (free + p["k0"])
+
+
+def _between(lines: np.ndarray, known: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Interpolate a response in magnitude and phase."""
+    size = np.interp(lines, known, np.log(np.abs(values)))
+    return np.exp(size + 1j * np.interp(lines, known, np.unwrap(np.angle(values))))
+
+
+def _gain(
+    effect: str,
+    cycles: float,
+    motion: _Motion,
+    plant: Mapping[str, float],
+    misfit: Misfit,
+    basis: np.ndarray,
+    left: np.ndarray,
+) -> float:
+    """Return how far the best amplitude and phase of a ripple would lower the chi-square."""
+    angle = cycles * motion.motor
+    turns = np.array([np.sin(angle), np.cos(angle)])
+    lines = motion.response.shape[-1]
+    if effect == "position_friction":
+        changes = spectrum(-turns * np.sign(motion.velocity), lines) * motion.response
+    elif effect == "cogging":
+        changes = spectrum(turns, lines) * motion.response
+    else:
+        slopes = cycles * np.array([np.cos(angle), -np.sin(angle)])
+        changes = spectrum(plant["k0"] * turns, lines) * motion.both
+        changes -= spectrum(slopes * motion.transmitted, lines) * motion.response
+    return _lowered(misfit.errors_of(changes), basis, left)
+
+
+def _lowered(columns: np.ndarray, basis: np.ndarray, left: np.ndarray) -> float:
+    own = columns - (columns @ basis) @ basis.T
+    weights = np.linalg.lstsq(own.T, left, rcond=1e-9)[0]
+    return float(weights @ (own @ left))

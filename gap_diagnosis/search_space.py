@@ -1,0 +1,212 @@
+"""From which values an effect is fitted: several starting points each, and natural scales."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fjr_sim_node import effects as fx
+from fjr_sim_node import plant
+
+from .model import Model
+
+TOLERANCE = 0.1
+"""How far a datasheet value may be off; fits look three times as far, since a torque constant that
+is off scales all values."""
+
+_CYCLES = (1.0, 2.0, 4.0, 8.0, 16.0, 24.0, 36.0, 52.0, 72.0, 96.0, 120.0)
+"""Ripples per turn to try where the loop cannot be repeated; else `ripples` finds better ones."""
+
+STARTS: dict[str, tuple[dict[str, tuple[float, ...]], ...]] = {
+    "stribeck_friction_motor": ({"torque_nm": (0.3, 2.0), "velocity_rad_s": (0.02, 0.1, 0.5)},),
+    "stribeck_friction_link": ({"torque_nm": (0.3, 2.0), "velocity_rad_s": (0.02, 0.1, 0.5)},),
+    "asymmetric_friction": (
+        {"coulomb_nm": (0.3,), "viscous_nm_s_rad": (0.0,)},
+        {"coulomb_nm": (0.0,), "viscous_nm_s_rad": (0.2,)},
+    ),
+    "torque_bias": ({"torque_nm": (0.3,)},),
+    "presliding_friction": (
+        {"motor_rad": (2e-4, 2e-3), "link_rad": (0.0,)},
+        {"motor_rad": (0.0,), "link_rad": (2e-4, 2e-3)},
+    ),
+    "load_friction": ({"coefficient": (0.01, 0.05)},),
+    "position_friction": (
+        {
+            "amplitude_nm": (0.3,),
+            "cycles_per_turn": _CYCLES,
+            "phase_rad": (0.0, np.pi / 2),
+        },
+    ),
+    "quadratic_friction": (
+        {"motor_nm_s2_rad2": (0.05,), "link_nm_s2_rad2": (0.0,)},
+        {"motor_nm_s2_rad2": (0.0,), "link_nm_s2_rad2": (0.05,)},
+    ),
+    "backlash": ({"half_gap_rad": (2e-4, 1e-3, 4e-3)},),
+    "piecewise_stiffness": ({"zone_rad": (1e-3, 4e-3, 2e-2, 6e-2), "soft_ratio": (0.4, 0.9)},),
+    "hysteresis": ({"torque_nm": (0.5, 4.0), "displacement_rad": (3e-4, 3e-3, 2e-2)},),
+    "transmission_damping": ({"nm_s_rad": (0.1, 1.0)},),
+    "kinematic_error": (
+        {
+            "amplitude_rad": (3e-4,),
+            "cycles_per_turn": _CYCLES,
+            "phase_rad": (0.0, np.pi / 2),
+        },
+    ),
+    "extra_mode": (
+        {
+            "inertia_kg_m2": (3e-3, 2e-2),
+            "frequency_hz": (8.0, 15.0, 22.0, 30.0, 40.0, 55.0),
+            "damping_ratio": (0.03,),
+        },
+    ),
+    "gravity": ({"torque_nm": (0.5, 4.0), "angle_rad": (0.0, np.pi / 2, np.pi)},),
+    "cogging": (
+        {
+            "amplitude_nm": (0.3,),
+            "cycles_per_turn": _CYCLES,
+            "phase_rad": (0.0, np.pi / 2),
+        },
+    ),
+    "delay": ({"time_s": (1e-4, 5e-4)},),
+    "actuator_lag": ({"time_constant_s": (1e-4, 5e-4)},),
+    "torque_saturation": ({"limit_nm": (np.nan,)},),  # from the data: see `starts`
+    "torque_gain": ({"relative_error": (0.05,)},),
+    "encoder_quantization": ({"resolution_rad": (1e-4, 5e-4)},),
+    "encoder_eccentricity": ({"amplitude_rad": (1e-3, 3e-2), "phase_rad": (0.0, np.pi / 2)},),
+}
+"""Grids of starting values of each effect that can be fitted; nonstationarity is a gate."""
+
+
+FIT_BOUNDS: dict[str, tuple[float, float]] = {
+    "stribeck_friction_motor.velocity_rad_s": (0.01, 5.0),
+    "stribeck_friction_link.velocity_rad_s": (0.01, 5.0),
+    "hysteresis.displacement_rad": (5e-5, 0.3),
+    "position_friction.cycles_per_turn": (0.3, 250.0),
+    "kinematic_error.cycles_per_turn": (0.3, 250.0),
+    "cogging.cycles_per_turn": (0.3, 250.0),
+    "extra_mode.frequency_hz": (2.0, 120.0),
+    "extra_mode.damping_ratio": (0.0, 0.5),
+    "delay.time_s": (0.0, 2e-3),
+    "actuator_lag.time_constant_s": (0.0, 5e-3),
+    "load_friction.coefficient": (0.0, 0.5),
+}
+"""Narrower bounds of shape parameters: beyond them the data say nothing, or the loop diverges."""
+
+NEGLIGIBLE: dict[str, float] = {
+    "presliding_friction.motor_rad": 1e-5,
+    "presliding_friction.link_rad": 1e-5,
+    "actuator_lag.time_constant_s": 2e-5,
+}
+"""Sizes below which an effect counts as off, since it would only make the plant stiff."""
+
+
+def starts(
+    effect: str, peak_torque_nm: float, cycles: Sequence[float] | None = None
+) -> list[dict[str, float]]:
+    """Return the starting points of an effect by full parameter name.
+
+    Args:
+        effect: identifier.
+        peak_torque_nm: greatest torque of the record; a drive that saturates does so below it,
+            and far below where the loop then asks for more.
+        cycles: ripples per turn of an angle-periodic effect; None for a coarse grid.
+    """
+    if effect == "torque_saturation":
+        shares = (0.15, 0.25, 0.4, 0.55, 0.7, 0.8, 0.9, 0.97)
+        return [{"torque_saturation.limit_nm": share * peak_torque_nm} for share in shares]
+    points = []
+    for grid in STARTS[effect]:
+        if cycles is not None and "cycles_per_turn" in grid:
+            grid = {**grid, "cycles_per_turn": tuple(cycles)}
+        for values in itertools.product(*grid.values()):
+            names = (f"{effect}.{name}" for name in grid)
+            points.append(dict(zip(names, values, strict=True)))
+    return points
+
+
+@dataclass(frozen=True)
+class Space:
+    """Free parameters of a model and how they map to numbers near 1.
+
+    Base parameters are free on a logarithmic scale around the nominal value; effect parameters are
+    free on a linear scale, in units of `units`.
+
+    Attributes:
+        nominal: nominal base parameters.
+        effects: full names of the free effect parameters.
+        units: scale of each, float64.
+        tolerance: how far a nominal value may be off.
+    """
+
+    nominal: Mapping[str, float]
+    effects: tuple[str, ...] = ()
+    units: tuple[float, ...] = ()
+    tolerance: float = TOLERANCE
+
+    def model(self, x: np.ndarray) -> Model:
+        """Return the model at a point."""
+        base = {
+            name: value * float(np.exp(step))
+            for (name, value), step in zip(self.nominal.items(), x, strict=False)
+        }
+        values = x[len(self.nominal) :] * np.array(self.units)
+        effects = {
+            name: value if abs(value) >= NEGLIGIBLE.get(name, 0.0) else 0.0
+            for name, value in zip(self.effects, values.tolist(), strict=True)
+        }
+        return Model(base, effects)
+
+    def point(self, model: Model) -> np.ndarray:
+        """Return the point of a model."""
+        base = [
+            np.log(model.plant[name] / value) if value else 0.0
+            for name, value in self.nominal.items()
+        ]
+        values = [
+            model.effects.get(name, _DEFAULT[name]) / unit
+            for name, unit in zip(self.effects, self.units, strict=True)
+        ]
+        return np.array(base + values)
+
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return lower and upper bounds of a point."""
+        far = np.log1p(3.0 * self.tolerance)
+        low = [-far if value else 0.0 for value in self.nominal.values()]
+        high = [far if value else 0.0 for value in self.nominal.values()]
+        for name, unit in zip(self.effects, self.units, strict=True):
+            parameter = _PARAMETER[name]
+            least, most = FIT_BOUNDS.get(name, (parameter.low, parameter.high))
+            low.append(max(least / unit, -1e6))
+            high.append(min(most / unit, 1e6))
+        return np.array(low), np.array(high)
+
+
+_PARAMETER = {parameter.name: parameter for parameter in fx.PARAMETERS}
+_DEFAULT = {parameter.name: float(parameter.default) for parameter in fx.PARAMETERS}
+
+
+def space_for(nominal: Mapping[str, float], start: Mapping[str, float]) -> Space:
+    """Return the space in which a start's effect parameters are free, in units of the start.
+
+    A parameter that starts at zero has the unit of the other sizes of its effect, or 1. A rigid
+    axis has no parameters of the link.
+    """
+    if "k0" not in nominal:
+        start = {name: value for name, value in start.items() if ".link_" not in name}
+    units = []
+    for name, value in start.items():
+        effect = fx.EFFECTS[name.split(".", 1)[0]]
+        if name.endswith(("phase_rad", "angle_rad")):
+            units.append(1.0)
+        elif value:
+            units.append(abs(value))
+        else:
+            sizes = [abs(start[n]) for n in effect.names[: effect.sizes] if start.get(n)]
+            units.append(max(sizes) if sizes else 1.0)
+    return Space(nominal, tuple(start), tuple(units))
+
+
+BASE = plant.PLANT.names
