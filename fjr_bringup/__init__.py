@@ -1,0 +1,1 @@
+"""The `fjr` command: campaigns on the ROS graph or in batch, recorder, import, analysis."""

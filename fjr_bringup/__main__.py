@@ -1,0 +1,5 @@
+"""`python -m fjr_bringup` is the `fjr` command."""
+
+from .cli import main
+
+main()

@@ -1,0 +1,69 @@
+"""Runs a campaign through the batch simulation, without ROS, on all cores: the same bags."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from pathlib import Path
+
+from fjr_interface.bag_writer import BagWriter
+from fjr_sim_node.simulator import run_realization
+
+from .campaign import Campaign, bag_folder
+from .processes import die_with
+from .progress import CampaignProgress
+
+
+def simulate_campaign(
+    campaign: Campaign, folder: Path, *, progress: CampaignProgress, workers: int | None = None
+) -> list[Path]:
+    """Simulate what the folder lacks of a campaign.
+
+    Args:
+        campaign: what to run.
+        folder: experiment folder; an interrupted campaign in it is resumed.
+        progress: where progress is shown.
+        workers: processes; None for one on each core.
+
+    Returns:
+        The bags that were written.
+
+    Raises:
+        InputError: the folder can't be used, or a motion diverges; finished bags are kept.
+    """
+    pending = campaign.open_folder(folder)
+    progress.expect(campaign, pending)
+    workers = min(workers or len(os.sched_getaffinity(0)), len(pending))
+    if workers <= 1:
+        return [_finish(progress, *_simulate(campaign, folder, *run)) for run in pending]
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(workers, context, _begin_worker, (os.getpid(),)) as pool:
+        futures = [pool.submit(_simulate, campaign, folder, *run) for run in pending]
+        try:
+            return [_finish(progress, *future.result()) for future in as_completed(futures)]
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
+
+
+def _begin_worker(parent: int) -> None:
+    """Leave Ctrl-C to the parent, which lets the bags under way be finished; end with it."""
+    die_with(parent)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _simulate(campaign: Campaign, folder: Path, level: int, realization: int) -> tuple[Path, float]:
+    """Simulate and write one realization; return its bag and its length in seconds."""
+    experiment = campaign.experiment(level, realization)
+    trajectory = run_realization(campaign.values["simulator"], experiment)
+    bag = bag_folder(folder, level, realization)
+    with BagWriter(bag, experiment) as writer:
+        writer.write_arrays(r=trajectory.reference, y=trajectory.position, u=trajectory.torque)
+    return bag, experiment.samples / experiment.sample_rate_hz
+
+
+def _finish(progress: CampaignProgress, bag: Path, seconds: float) -> Path:
+    progress.finish_run(f"{bag.name} simulated", seconds)
+    return bag

@@ -1,0 +1,172 @@
+"""Talks to a rig that was started by hand, as the `ros2` command would."""
+
+from __future__ import annotations
+
+import os
+import time
+from types import TracebackType
+from typing import Any
+
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+from rcl_interfaces.srv import SetParametersAtomically
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.signals import SignalHandlerOptions
+from std_srvs.srv import Trigger
+
+import fjr_interface.ros  # noqa: F401 keeps discovery on this machine
+from fjr_interface.errors import InputError
+from fjr_interface.topics import NAMESPACE
+
+from .domain import reach
+
+_FIND_S = 4.0
+_ANSWER_S = 5.0
+_AGAIN_S = 1.0  # an answer may be lost while the two are finding each other
+_FOUND_S = 0.1
+_DIAGNOSTICS_S = 1.2  # they come once a second
+_POLL_S = 0.02
+_LEVELS = ("ok", "WARN", "ERROR", "stale")
+
+
+class Rig:
+    """The nodes of the ROS domain that the environment names; a context manager."""
+
+    def __enter__(self) -> Rig:
+        """Join the domain."""
+        rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+        self._node = rclpy.create_node(f"fjr_{os.getpid()}", namespace=NAMESPACE)
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(self._node)
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Leave the domain."""
+        self._executor.shutdown()
+        self._node.destroy_node()
+        rclpy.try_shutdown()
+
+    def trigger(self, service: str) -> str:
+        """Call a service of type std_srvs/Trigger; return its message.
+
+        Args:
+            service: one that may be called twice, such as simulator/pause.
+
+        Raises:
+            InputError: nobody offers it, it refuses, or no answer comes.
+        """
+        return _message(self._call(Trigger, service, Trigger.Request()))
+
+    def step(self, steps: int) -> str:
+        """Play so many samples of a paused simulation; return its status when they are done.
+
+        Raises:
+            InputError: there is no simulator, it is not paused, or it gives the steps up.
+        """
+        self.set("simulator", "steps", steps)
+        self.trigger("simulator/status")
+        service = "simulator/step"
+        return _message(self._call(Trigger, service, Trigger.Request(), once=True))
+
+    def set(self, node: str, name: str, value: float | int) -> None:
+        """Set a parameter of a node.
+
+        Raises:
+            InputError: there is no such node, or it refuses the value.
+        """
+        if isinstance(value, int):
+            typed = ParameterValue(type=ParameterType.PARAMETER_INTEGER, integer_value=value)
+        else:
+            typed = ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=value)
+        request = SetParametersAtomically.Request()
+        request.parameters = [Parameter(name=name, value=typed)]
+        service = f"{node}/set_parameters_atomically"
+        result = self._call(SetParametersAtomically, service, request).result
+        if not result.successful:
+            raise InputError(_sentence(result.reason))
+
+    def diagnostics(self) -> list[DiagnosticStatus]:
+        """Return the newest diagnostics of every node of the rig, by name.
+
+        Raises:
+            InputError: none come.
+        """
+        heard: dict[str, DiagnosticStatus] = {}
+
+        def hear(message: DiagnosticArray) -> None:
+            statuses = {status.name: status for status in message.status}
+            heard.update({k: v for k, v in statuses.items() if k.startswith(f"{NAMESPACE[1:]}/")})
+
+        subscription = self._node.create_subscription(DiagnosticArray, "/diagnostics", hear, 10)
+        began = time.monotonic()
+        while (passed_s := time.monotonic() - began) < _FIND_S:
+            self._executor.spin_once(timeout_sec=_POLL_S)
+            if passed_s > _DIAGNOSTICS_S and 0 < self._diagnosed() <= len(heard):
+                break
+        self._node.destroy_subscription(subscription)
+        if not heard:
+            raise InputError(self._not_found("no node publishes diagnostics"))
+        return [heard[name] for name in sorted(heard)]
+
+    def _diagnosed(self) -> int:
+        """Return how many nodes of the rig publish diagnostics."""
+        writers = self._node.get_publishers_info_by_topic("/diagnostics")
+        return sum(writer.node_namespace == NAMESPACE for writer in writers)
+
+    def _not_found(self, what: str) -> str:
+        domain = os.environ.get("ROS_DOMAIN_ID") or "0"
+        return (
+            f"No rig is found in ROS domain {domain} ({what}; {reach()}); start its nodes, or set "
+            "ROS_DOMAIN_ID to their domain."
+        )
+
+    def _call(self, kind: Any, service: str, request: Any, *, once: bool = False) -> Any:
+        """Return the answer of a service; one that is called once is waited for without end."""
+        client = self._node.create_client(kind, service)
+        until = time.monotonic() + _FIND_S
+        while not client.service_is_ready():
+            self._executor.spin_once(timeout_sec=_POLL_S)
+            if time.monotonic() > until:
+                raise InputError(self._not_found(f"nobody offers {client.srv_name}"))
+        # The node drops its answer to a client that it has not found yet.
+        self._executor.spin_once(timeout_sec=_FOUND_S)
+        calls = [client.call_async(request)]
+        until, again = time.monotonic() + _ANSWER_S, time.monotonic() + _AGAIN_S
+        while not any(call.done() for call in calls):
+            self._executor.spin_once(timeout_sec=_POLL_S)
+            if once:
+                continue
+            if time.monotonic() > until:
+                raise InputError(f"No answer comes from {client.srv_name}; its node hangs.")
+            if time.monotonic() > again:
+                calls.append(client.call_async(request))
+                again += _AGAIN_S
+        return next(call.result() for call in calls if call.done())
+
+
+def _message(answer: Trigger.Response) -> str:
+    if not answer.success:
+        raise InputError(_sentence(answer.message))
+    return str(answer.message)
+
+
+def _sentence(text: str) -> str:
+    """Return a refusal as a sentence."""
+    return text if text.endswith(".") else f"It refuses: {text}."
+
+
+def describe(statuses: list[DiagnosticStatus]) -> str:
+    """Return diagnostics as a person reads them: a line for each node, its figures below."""
+    lines = []
+    for status in statuses:
+        node = status.name.split(":")[0].rpartition("/")[2]
+        level = _LEVELS[min(status.level[0], 3)]
+        lines.append(f"{node}: {level}, {status.message}")
+        lines += [f"  {each.key}: {each.value}" for each in status.values]
+    return "\n".join(lines)

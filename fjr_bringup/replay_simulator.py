@@ -1,0 +1,94 @@
+"""Stands in for the drive: publishes the recorded positions, in lockstep with the torques.
+
+`python -m fjr_bringup.replay_simulator --ros-args -p bag:=FOLDER`
+"""
+
+from __future__ import annotations
+
+import sys
+
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+
+from fjr_interface import ros, topics
+from fjr_interface.errors import InputError
+from fjr_interface.experiment import Experiment
+from fjr_interface.joint_state import JointStateReader, JointStateWriter, LayoutError
+from fjr_interface.parameters import ParameterGroup
+
+from .replay_bag import BAG_PARAMETER, clock_message, read_recorded
+
+PARAMETERS = ParameterGroup(BAG_PARAMETER, ros.JOINT_PARAMETER, ros.readers_parameter("controller"))
+
+
+class ReplaySimulatorNode(ros.RigNode):
+    """A drive whose positions are a bag's, whatever the torque.
+
+    Each experiment description starts the replay; each torque of the sample's stamp is answered
+    with the next position.
+    """
+
+    def __init__(self) -> None:
+        """Read the bag, create publishers and subscriptions."""
+        super().__init__("simulator", PARAMETERS)
+        record = read_recorded(str(self.values["bag"])).record
+        encoder = JointStateWriter("position", str(self.values["joint"]))
+        self._messages = encoder.encode_many(record.stamps_ns, record.position)
+        self._stamps = record.stamps_ns.tolist()
+        self._decode = JointStateReader("effort").decode
+        self._sample = len(self._stamps)
+        self._ticks = self.create_publisher(Clock, "/clock", ros.CLOCK_QOS)
+        self._position = self.create_publisher(
+            JointState, topics.MOTOR_POSITION.topic, ros.SIGNAL_QOS
+        )
+        self._torque = self.create_subscription(
+            JointState, topics.MOTOR_TORQUE.topic, self._on_torque, ros.SIGNAL_QOS, raw=True
+        )
+        self.create_subscription(
+            String, topics.EXPERIMENT_TOPIC, self._on_experiment, ros.EXPERIMENT_QOS
+        )
+
+    def _on_experiment(self, message: String) -> None:
+        experiment = Experiment.from_json(message.data, "topic experiment")
+        if experiment.stamps_ns.tolist() != self._stamps:
+            raise InputError(
+                "The experiment has other stamps than the bag; let the same bag give the reference."
+            )
+        self._sample = 0
+        self.wait_until(self._lacking, self._publish_sample)
+
+    def _lacking(self) -> str | None:
+        return self.unread(self._position) or self.unwritten(self._torque)
+
+    def _publish_sample(self) -> None:
+        self._position.publish(self._messages[self._sample].tobytes())
+        self._ticks.publish(clock_message(self._stamps[self._sample]))
+
+    def _on_torque(self, message: bytes) -> None:
+        try:
+            stamp, _ = self._decode(message)
+        except LayoutError as error:
+            raise InputError(f"Topic motor_torque: {error}; publish one effort.") from None
+        if self._due_ns() != stamp:
+            return  # a late answer to a run that was replaced
+        self._sample += 1
+        if self._sample < len(self._stamps):
+            self._publish_sample()
+
+    def _due_ns(self) -> int | None:
+        return self._stamps[self._sample] if self._sample < len(self._stamps) else None
+
+    def owed(self) -> str | None:
+        """Return the torque that the replay waits for."""
+        due = self._due_ns()
+        return None if due is None else f"the torque of {due * 1e-9:.6f} s"
+
+
+def main() -> int:
+    """Run the node."""
+    return ros.run(ReplaySimulatorNode)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
