@@ -1,0 +1,184 @@
+"""Helpers of the tests of effects: a rig that is held sample by sample, and its energy."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from controller_node import pd_filtered
+from excitation_node import multisine
+from fjr_sim_node import closed_loop, effects, plant, rig
+
+RATE = 1000.0
+PAPER = plant.PLANT.defaults()
+FRICTIONLESS = {"fs": 0.0, "fsm": 0.0, "fv": 0.0, "fvm": 0.0}
+LINK_HELD = {"fs": 1e5}
+MOTOR_HELD = {"fsm": 1e5}
+APART = {"k0": 0.0, "k1": 0.0}
+CONTROLLER = pd_filtered.coefficients(pd_filtered.CONTROLLER.defaults())
+
+MODERATE = {
+    "stribeck_friction_motor": {"torque_nm": 2.0, "velocity_rad_s": 0.05},
+    "stribeck_friction_link": {"torque_nm": 2.0, "velocity_rad_s": 0.05},
+    "asymmetric_friction": {"coulomb_nm": 1.0, "viscous_nm_s_rad": 0.5},
+    "torque_bias": {"torque_nm": 1.0},
+    "presliding_friction": {"motor_rad": 1e-3, "link_rad": 5e-4},
+    "load_friction": {"coefficient": 0.1},
+    "position_friction": {
+        "amplitude_nm": 2.0,
+        "cycles_per_turn": 50.0,
+        "phase_rad": 0.3,
+        "second_ratio": 0.4,
+        "second_phase_rad": 0.9,
+    },
+    "quadratic_friction": {"motor_nm_s2_rad2": 2.0, "link_nm_s2_rad2": 2.0},
+    "backlash": {"half_gap_rad": 1e-3},
+    "piecewise_stiffness": {"zone_rad": 2e-3, "soft_ratio": 0.4},
+    "hysteresis": {"torque_nm": 3.0, "displacement_rad": 1e-3},
+    "transmission_damping": {"nm_s_rad": 2.0},
+    "kinematic_error": {
+        "amplitude_rad": 1e-3,
+        "cycles_per_turn": 20.0,
+        "phase_rad": 0.3,
+        "second_ratio": 0.4,
+        "second_phase_rad": 0.9,
+    },
+    "extra_mode": {"inertia_kg_m2": 0.03, "frequency_hz": 30.0, "damping_ratio": 0.02},
+    "gravity": {"torque_nm": 3.0, "angle_rad": 0.5},
+    "cogging": {
+        "amplitude_nm": 1.0,
+        "cycles_per_turn": 24.0,
+        "phase_rad": 0.3,
+        "second_ratio": 0.4,
+        "second_phase_rad": 0.9,
+    },
+    "delay": {"time_s": 5e-4},
+    "actuator_lag": {"time_constant_s": 1e-3},
+    "torque_saturation": {"limit_nm": 30.0},
+    "torque_gain": {"relative_error": 0.05},
+    "encoder_quantization": {"resolution_rad": 1e-5},
+    "encoder_eccentricity": {"amplitude_rad": 1e-3, "phase_rad": 0.3},
+    "nonstationary": {"friction_per_s": 0.02},
+}
+"""A size of each effect that shows in the closed loop."""
+
+
+def named(identifier: str, **values: float) -> dict[str, float]:
+    """Return an effect's parameters under their full names."""
+    return {f"{identifier}.{name}": value for name, value in values.items()}
+
+
+def moderate(*identifiers: str) -> tuple[float, ...] | None:
+    """Return the coefficients with these effects at a moderate size."""
+    together: dict[str, float] = {}
+    for identifier in identifiers:
+        together |= named(identifier, **MODERATE[identifier])
+    return effects.coefficients(together)
+
+
+@dataclass
+class Rig:
+    """A rig under held torque.
+
+    Attributes:
+        plant: bare parameters that differ from the paper's.
+        effects: effect parameters by full name.
+        x: state: q, vq, th, vth, q3, v3, lagged torque, built-up link, motor, hysteresis.
+    """
+
+    plant: dict[str, float] = field(default_factory=dict)
+    effects: dict[str, float] = field(default_factory=dict)
+    x: np.ndarray = field(default_factory=rig.at_rest)
+
+    def __post_init__(self) -> None:
+        self.values = plant.PLANT.check(self.plant)
+        self.p = plant.coefficients(self.values)
+        self.e = effects.coefficients(self.effects)
+
+    def start(self, q=0.0, vq=0.0, th=0.0, vth=0.0) -> Rig:
+        """Set the motion of the two bodies."""
+        self.x[:4] = q, vq, th, vth
+        self.x[4] = q
+        return self
+
+    def hold(self, torque: float, duration: float = 1e-3, parts: int = 1) -> np.ndarray:
+        """Hold a torque; return a copy of q, vq, th, vth, ... after it."""
+        for _ in range(parts):
+            rig.hold(self.x, torque, duration / parts, self.p, self.e)
+        return self.x[:10].copy()
+
+    def play(self, torque, duration: float = 1e-3, parts: int = 1) -> np.ndarray:
+        """Hold one torque after the other; return the states, shape (torques, 10)."""
+        return np.array([self.hold(float(u), duration, parts) for u in torque])
+
+    def energy(self) -> float:
+        """Return kinetic energy and what all springs and fields hold (J)."""
+        v = self.values
+        e = effects.DEFAULTS if self.e is None else self.e
+        get = dict(zip(effects.NAMES, e, strict=True)).__getitem__
+        q, vq, th, vth, q3, v3, _, link, motor, flex = self.x[:10]
+        rate = 2.0 * math.pi * get("extra_mode.frequency_hz")
+        third = 0.5 * get("extra_mode.inertia_kg_m2") * (v3**2 + (rate * (q3 - q)) ** 2)
+        ripple, cycles = get("cogging.amplitude_nm"), get("cogging.cycles_per_turn")
+        angle = cycles * th + get("cogging.phase_rad")
+        return (
+            0.5 * v["j"] * vq**2
+            + 0.5 * v["jm"] * vth**2
+            + third
+            + spring_energy(twist(q, th, get), v, get)
+            + 0.5 * get("presliding_friction.link_rad") * v["fs"] * link**2
+            + 0.5 * get("presliding_friction.motor_rad") * v["fsm"] * motor**2
+            + 0.5 * get("hysteresis.torque_nm") * get("hysteresis.displacement_rad") * flex**2
+            - get("gravity.torque_nm") * math.cos(q + get("gravity.angle_rad"))
+            + ripple / cycles * math.cos(angle)
+            + ripple
+            * get("cogging.second_ratio")
+            / (2.0 * cycles)
+            * math.cos(2.0 * angle + get("cogging.second_phase_rad"))
+        )
+
+
+def twist(q, th, get) -> float:
+    """Return the deflection with kinematic error (rad)."""
+    angle = get("kinematic_error.cycles_per_turn") * th + get("kinematic_error.phase_rad")
+    second = math.sin(2.0 * angle + get("kinematic_error.second_phase_rad"))
+    error = math.sin(angle) + get("kinematic_error.second_ratio") * second
+    return q - th + get("kinematic_error.amplitude_rad") * error
+
+
+def spring_energy(d, v, get) -> float:
+    """Return the energy of the transmission's spring behind gap and soft zone (J)."""
+    d = max(abs(d) - get("backlash.half_gap_rad"), 0.0)
+    zone, ratio = get("piecewise_stiffness.zone_rad"), get("piecewise_stiffness.soft_ratio")
+    inside = min(d, zone)
+    beyond = d - inside
+    linear = 0.5 * ratio * inside**2 + ratio * inside * beyond + 0.5 * beyond**2
+    return v["k0"] * linear + 0.25 * v["k1"] * d**4
+
+
+def multisine_reference(amplitude: float, seed: int = 1) -> np.ndarray:
+    """Return one period of the paper's reference at 1 kHz (rad)."""
+    values = multisine.EXCITATION.check(
+        {"amplitudes_rad": (amplitude,), "periods": 1, "transient_periods": 0, "seed": seed}
+    )
+    return multisine.reference(multisine.describe(values, 0, 0))
+
+
+def simulate(reference, e, elapsed_s=0.0, noise=None, **plant_values):
+    """Simulate the paper's loop with effects."""
+    return closed_loop.simulate(
+        reference,
+        RATE,
+        plant.coefficients(plant.PLANT.check(plant_values)),
+        CONTROLLER,
+        noise,
+        e,
+        elapsed_s,
+    )
+
+
+def relative_rms(signal, exact) -> float:
+    """Return the rms of the difference over the rms of the exact signal."""
+    return float(np.sqrt(np.mean((signal - exact) ** 2) / np.mean(exact**2)))

@@ -1,0 +1,120 @@
+"""Experiment folders of real bags with a chosen effect, made by batch simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from controller_node import pd_filtered
+from excitation_node import multisine
+from fjr_interface.bag_writer import BagWriter
+from fjr_sim_node.plant import PLANT
+from fjr_sim_node.simulator import SIMULATOR, run_realization
+from gap_diagnosis.model import Model
+from gap_diagnosis.records import Realization, RecordedExperiment
+
+LEVELS_RAD = (2e-3, 7e-3, 2e-2)
+NOISE_RAD = 2e-5
+
+
+@dataclass(frozen=True)
+class Case:
+    """An experiment and the rig that made it.
+
+    Attributes:
+        recorded: what was recorded, in memory.
+        rig: checked SIMULATOR values of the rig.
+        truth: the rig as a model, effects included.
+    """
+
+    recorded: RecordedExperiment
+    rig: Mapping[str, float]
+    truth: Model
+
+    @property
+    def bare(self) -> Model:
+        """The rig's true bare parameters without the effect."""
+        return Model(self.truth.plant, {})
+
+
+def true_parameters(seed: int, off: float = 0.08) -> dict[str, float]:
+    """Return the paper's parameters, each up to `off` wrong."""
+    factors = 1.0 + np.random.default_rng([seed, 77]).uniform(-off, off, len(PLANT.names))
+    return {p.name: p.default * f for p, f in zip(PLANT, factors, strict=True)}
+
+
+def simulate_case(
+    effects: Mapping[str, float] | None = None,
+    *,
+    seed: int = 0,
+    off: float = 0.08,
+    levels_rad: Sequence[float] = LEVELS_RAD,
+    realizations: int = 2,
+    periods: int = 2,
+    transient_periods: int = 1,
+    noise_rad: float = NOISE_RAD,
+    with_link: bool = False,
+    base_frequency_hz: float = 0.25,
+    controller: Mapping[str, Any] | None = None,
+    plant: Mapping[str, float] | None = None,
+) -> Case:
+    """Simulate an experiment as the sealed cases are made, in memory."""
+    effects = dict(effects or {})
+    rig = SIMULATOR.check(
+        {
+            **true_parameters(seed, off),
+            **(plant or {}),
+            **effects,
+            "noise_std_rad": noise_rad,
+            "noise_seed": seed + 1,
+        }
+    )
+    excitation = multisine.EXCITATION.check(
+        {
+            "base_frequency_hz": base_frequency_hz,
+            "f_min_hz": base_frequency_hz,
+            "amplitudes_rad": tuple(levels_rad),
+            "realizations": realizations,
+            "periods": periods,
+            "transient_periods": transient_periods,
+            "seed": seed + 1,
+        }
+    )
+    law = dict(controller or {})
+    if "kind" not in law:
+        law = pd_filtered.describe(pd_filtered.CONTROLLER.check(law))
+    done = []
+    for level in range(len(levels_rad)):
+        for number in range(realizations):
+            experiment = multisine.describe(excitation, level, number, law)
+            run = run_realization(rig, experiment)
+            shape = (-1, experiment.samples_per_period)
+            done.append(
+                Realization(
+                    f"level_{level}_realization_{number:03d}",
+                    experiment,
+                    run.reference.reshape(shape),
+                    run.torque.reshape(shape),
+                    run.position.reshape(shape),
+                    run.link.reshape(shape) if with_link else None,
+                )
+            )
+    truth = Model.nominal(rig).with_effects(effects)
+    return Case(RecordedExperiment(f"case {seed}", tuple(done)), rig, truth)
+
+
+def write_bags(case: Case, folder: Path) -> Path:
+    """Write the bags of a case, one for each realization; return the folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for realization in case.recorded.realizations:
+        with BagWriter(folder / realization.name, realization.experiment) as writer:
+            writer.write_arrays(
+                r=realization.reference.ravel(),
+                y=realization.position.ravel(),
+                u=realization.torque.ravel(),
+            )
+    return folder

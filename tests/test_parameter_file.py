@@ -1,0 +1,241 @@
+"""Parameter files: read as rcl reads them, written so that rcl reads them back."""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+import sys
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fjr_interface.errors import InputError
+from fjr_interface.parameter_file import load_parameter_file, save_parameter_file
+from fjr_interface.parameters import Parameter, ParameterGroup
+
+READ_BY_RCL = """
+import json, os, sys
+os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+import rclpy
+from rclpy.node import Node
+found = []
+for path in sys.argv[1:]:
+    rclpy.init(args=["--ros-args", "--params-file", path])
+    node = Node("simulator", namespace="/rig", automatically_declare_parameters_from_overrides=True,
+                start_parameter_services=False, enable_rosout=False)
+    own = ("use_sim_time", "start_type_description_service")
+    names = [n for n in node._parameters if n not in own]
+    found.append({n: [type(node._parameters[n].value).__name__, repr(node._parameters[n].value)]
+                  for n in names})
+    node.destroy_node()
+    rclpy.shutdown()
+print(json.dumps(found))
+"""
+
+TYPED_BY_RCL = """\
+rig:
+  simulator:
+    ros__parameters:
+      a: 1e-3
+      b: -1.5e+3
+      c: 010
+      d: 0x10
+      e: on
+      n: n
+      f: .inf
+      g: -.Inf
+      h: 1:30
+      i: 1_000
+      j: "1.0"
+      k: 1.
+      l: 08
+      m: 9223372036854775808
+      o: 1e999
+      p: '2'
+      q: null
+      deep: {r: 2, s.t: word}
+"""
+
+
+def write(tmp_path, text: str, name: str = "rig.yaml"):
+    path = tmp_path / name
+    path.write_text(text)
+    return path
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "/rig/simulator:\n  ros__parameters:\n    k1: 0.5\n",
+        "rig/simulator: {ros__parameters: {k1: 0.5}}",
+        "rig:\n  simulator:\n    ros__parameters:\n      k1: 0.5\n",
+        "/rig:\n  simulator:\n    ros__parameters:\n      k1: 0.5\n",
+        "/**/simulator:\n  ros__parameters:\n    k1: 0.5\n",
+        "/*/simulator:\n  ros__parameters:\n    k1: 0.5\n",
+    ],
+)
+def test_every_way_to_name_a_node(tmp_path, text):
+    assert load_parameter_file(write(tmp_path, text)) == {"simulator": {"k1": 0.5}}
+
+
+def test_wildcard_names_all_nodes_and_the_later_entry_holds(tmp_path):
+    wild = "/**:\n  ros__parameters:\n    rate: 2.0\n    seed: 1\n"
+    own = "/rig/simulator:\n  ros__parameters:\n    rate: 3.0\n"
+    for_all = {"rate": 2.0, "seed": 1}
+    after = load_parameter_file(write(tmp_path, wild + own))
+    assert after == {
+        "excitation": for_all,
+        "controller": for_all,
+        "simulator": {"rate": 3.0, "seed": 1},
+    }
+    before = load_parameter_file(write(tmp_path, own + wild))
+    assert before["simulator"] == for_all
+
+
+def test_empty_file_names_no_node(tmp_path):
+    assert load_parameter_file(write(tmp_path, "# nothing yet\n")) == {}
+
+
+def test_another_namespace(tmp_path):
+    path = tmp_path / "rig.yaml"
+    save_parameter_file(path, {"controller": {"p": 1.0}}, namespace="/left")
+    assert load_parameter_file(path, namespace="/left") == {"controller": {"p": 1.0}}
+    with pytest.raises(InputError, match="no node /left/controller"):
+        load_parameter_file(path)
+
+
+VALUES = st.one_of(
+    st.floats(allow_nan=False, allow_subnormal=False),
+    st.integers(-(2**63), 2**63 - 1),
+    st.booleans(),
+    st.text(st.characters(exclude_categories=["Cs"])),
+    st.lists(st.floats(allow_nan=False, allow_subnormal=False), min_size=1).map(tuple),
+)
+NAMES = st.from_regex(r"[a-z][a-z0-9_]{0,8}", fullmatch=True)
+
+
+@given(
+    st.dictionaries(st.sampled_from(("excitation", "simulator")), st.dictionaries(NAMES, VALUES))
+)
+def test_round_trip_keeps_type_and_bits(tmp_path_factory, values):
+    path = tmp_path_factory.mktemp("trip") / "rig.yaml"
+    save_parameter_file(path, values)
+    loaded = load_parameter_file(path)
+    assert repr(loaded) == repr(values)
+    again = path.with_name("again.yaml")
+    save_parameter_file(again, loaded)
+    assert again.read_bytes() == path.read_bytes()
+
+
+def test_comments_come_from_the_descriptions(tmp_path):
+    group = ParameterGroup(Parameter("k0", 1500.0, "N m/rad", "Stiffness", 0.0, 1e8))
+    path = tmp_path / "rig.yaml"
+    save_parameter_file(path, {"simulator": {"k0": 1e-7, "x": (1.0, 2e9)}}, {"simulator": group})
+    assert path.read_text().splitlines() == [
+        "/rig/simulator:",
+        "  ros__parameters:",
+        f"    k0: 1.0e-07  # {group['k0'].help}",
+        "    x: [1.0, 2000000000.0]",
+    ]
+
+
+def test_not_a_number_survives(tmp_path):
+    path = tmp_path / "rig.yaml"
+    save_parameter_file(path, {"simulator": {"x": math.nan}})
+    assert math.isnan(load_parameter_file(path)["simulator"]["x"])
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("/rig/simulator: [", r"line 1: this is not YAML"),
+        ("a: 1\n\tb: 2", r"line 2: this is not YAML"),
+        ("--- {}\n--- {}\n", r"not YAML .but found another document"),
+        ("- 1\n", r"line 1: below the file names with values must stand"),
+        ("word", r"below the file names"),
+        ("/rig/simulator: 3", r"simulator must hold ros__parameters"),
+        ("/rig/simulator:\n  k1: 3.0\n", r"line 2: k1 must hold ros__parameters"),
+        ("ros__parameters: {k1: 0.0}", r"must stand below a node's name"),
+        ("/rig/simulator:\n  ros__parameters: 3\n", r"line 2: below ros__parameters of /rig/sim"),
+        ("/rig/simulater:\n  ros__parameters: {}", r"no node /rig/simulater; the nodes are /rig/e"),
+        ("simulator:\n  ros__parameters: {}", r"no node /simulator"),
+        ("/rig/simulator: {ros__parameters: {k1: }}", r"k1 has no value"),
+        ("/rig/simulator: {ros__parameters: {k1: []}}", r"k1 is an empty list"),
+        ("/rig/simulator: {ros__parameters: {k1: [1.0, 2]}}", r"k1 mixes types"),
+        ("/rig/simulator: {ros__parameters: {k1: [[1.0]]}}", r"k1 must be a plain list"),
+        ("/rig/simulator: {ros__parameters: {[a]: 1.0}}", r"something that is not a name"),
+        (
+            "/rig/simulator:\n  ros__parameters:\n    k1: 1.0\n    k1: 2.0\n",
+            r"line 4: k1 stands twice",
+        ),
+        ("/rig/simulator: {ros__parameters: {a: &x 1.0, b: *x}}", r"does not read YAML aliases"),
+        ("[" * 5000 + "]" * 5000, r"nested too deeply"),
+    ],
+)
+def test_bad_file_is_refused_in_one_sentence(tmp_path, text, says):
+    path = write(tmp_path, text)
+    with pytest.raises(InputError, match=says) as refused:
+        load_parameter_file(path)
+    sentence = str(refused.value)
+    assert sentence.startswith(f"{path}: ") and sentence.endswith(".") and "\n" not in sentence
+
+
+def test_unreadable_and_binary_files(tmp_path):
+    with pytest.raises(InputError, match=r"none\.yaml: cannot be read: No such file"):
+        load_parameter_file(tmp_path / "none.yaml")
+    path = tmp_path / "rig.yaml"
+    path.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(InputError, match="not a text file in UTF-8"):
+        load_parameter_file(path)
+
+
+def test_refused_write_leaves_the_old_file(tmp_path):
+    path = write(tmp_path, "old")
+    with pytest.raises(InputError, match="x of simulator is empty"):
+        save_parameter_file(path, {"simulator": {"x": ()}})
+    with pytest.raises(InputError, match=r"cannot be written: No such file"):
+        save_parameter_file(tmp_path / "no" / "rig.yaml", {})
+    assert [p.name for p in tmp_path.iterdir()] == ["rig.yaml"] and path.read_text() == "old"
+
+
+@pytest.mark.ros
+def test_rcl_reads_the_same(tmp_path):
+    """rcl itself, in a process of its own, gives each value the type and bits that we give it."""
+    typed = write(tmp_path, TYPED_BY_RCL, "typed.yaml")
+    written = tmp_path / "written.yaml"
+    save_parameter_file(
+        written,
+        {
+            "simulator": {
+                "a": 1e-5,
+                "b": 0.1,
+                "c": 1e22,
+                "d": 3,
+                "e": True,
+                "f": 'no\n"\\ \x7fé😀',
+                "g": (1.0, 1e-9, -math.inf),
+                "h": -0.0,
+                "i": 5e-300,
+                "y": 2.0,
+            }
+        },
+    )
+    run = subprocess.run(
+        [sys.executable, "-c", READ_BY_RCL, str(typed), str(written)],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert run.returncode == 0, run.stderr
+    for path, by_rcl in zip((typed, written), json.loads(run.stdout), strict=True):
+        ours = load_parameter_file(path)["simulator"]
+        as_text = {
+            name: ["list", repr(list(value))]
+            if isinstance(value, tuple)
+            else [type(value).__name__, repr(value)]
+            for name, value in ours.items()
+        }
+        assert by_rcl == as_text
