@@ -86,7 +86,7 @@ class Difference:
             return taken
         worst = float(abs(error[at]))
         return replace(
-            taken, worst=worst, worst_sample=self.samples + at + 1, worst_s=stamps[at] * 1e-9
+            taken, worst=worst, worst_sample=self.samples + at + 1, worst_s=float(stamps[at]) * 1e-9
         )
 
 
