@@ -266,7 +266,9 @@ class ControllerNode(ros.RigNode):
         )
 
     def owed(self) -> str | None:
-        """Return the reference that a position waits for."""
+        """Return the reference that a position waits for, or the run that it could answer."""
+        if self._loop.strange:
+            return "a new realization: the one under way began without this controller"
         if self._position is None:
             return None
         return f"the reference of {self._position[0] * 1e-9:.6f} s"

@@ -31,6 +31,7 @@ class RealTimeController:
         missing: those of them whose reference was not there; an older one was used.
         lost: positions that never came, by their stamps.
         stale: positions that came again or behind a newer one; they get no answer.
+        strange: whether a run is under way that began before this controller was there.
     """
 
     def __init__(self, law: GuardedLaw, values: Mapping[str, Any]) -> None:
@@ -43,6 +44,7 @@ class RealTimeController:
         self._left = True
         self._pacing = False
         self._heard_ns = 0
+        self.strange = False
         self._take_values()
 
     def _take_values(self) -> None:
@@ -67,6 +69,7 @@ class RealTimeController:
         self._references.clear()
         self._end = None
         self._left = True
+        self.strange = False
         self._law.fall()
 
     def reference(self, stamp: int, value: float) -> None:
@@ -88,6 +91,7 @@ class RealTimeController:
         if sample <= _FIRST and (self._left or newest is None or newest - sample > _FIRST):
             self._begin(now_ns)
         elif newest is None:
+            self.strange = True
             return []
         if sample <= self._sample:
             self.stale += 1
@@ -110,7 +114,7 @@ class RealTimeController:
         self._take_values()
         self._heard_ns = now_ns
         self._law.begin_run(self._values)
-        self._sample, self._left, self._pacing = 0, False, False
+        self._sample, self._left, self._pacing, self.strange = 0, False, False, False
 
     def _answer(self, stamp: int, value: float, samples: int) -> float:
         self.lost += samples - 1

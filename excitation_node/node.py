@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+import time
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from fjr_interface.experiment import Experiment, controller_from_json
 from fjr_interface.health import Health
 from fjr_interface.joint_state import JointStateWriter
 from fjr_interface.parameters import Parameter, ParameterGroup
+from fjr_interface.real_time import NEVER
 
 from . import multisine
 
@@ -57,6 +59,10 @@ _PACES = {
 }
 _TIME = struct.Struct("<4xiI")  # with this begins the CDR of all three
 
+# A burst that overruns the transport's queue of 512 messages is repeated by DDS, 3 s later.
+_BURST = 100
+_PAUSE_NS = 2_000_000
+
 
 class ExcitationNode(ros.RigNode):
     """Plays one realization at a time; `start` (std_srvs/Trigger) plays the one set by parameters.
@@ -75,7 +81,8 @@ class ExcitationNode(ros.RigNode):
         )
         self._stamps = np.empty(0, np.int64)
         self._sent = 0
-        self._sent_ns = self._due_ns = 0
+        self._sent_ns = self._passed_ns = 0
+        self._next_ns = NEVER
         self._controller: dict[str, Any] | None = None
         self._stream_taken: int | None = None
         self._untaken = False
@@ -93,8 +100,10 @@ class ExcitationNode(ros.RigNode):
         seconds, nanoseconds = _TIME.unpack_from(message)
         passed_ns = seconds * 1_000_000_000 + nanoseconds
         # A time beyond what was sent is an earlier realization's, and no pace for this one.
-        if self._due_ns <= passed_ns <= self._sent_ns:
-            self._stream(passed_ns)
+        if self._passed_ns < passed_ns <= self._sent_ns:
+            self._passed_ns = passed_ns
+            if self.due_ns == NEVER and self._next_ns <= passed_ns:
+                self.on_time(time.monotonic_ns())
 
     def _on_controller(self, message: String) -> None:
         description = controller_from_json(message.data)
@@ -127,6 +136,7 @@ class ExcitationNode(ros.RigNode):
         """Check the request, then wait for the peers and begin; return what will be played."""
         self._played = experiment = self._describe()
         self._stamps = np.empty(0, np.int64)
+        self._next_ns, self._sent_ns = NEVER, 0
         self.wait_until(self._lacking, self._begin)
         return experiment
 
@@ -147,14 +157,17 @@ class ExcitationNode(ros.RigNode):
         self._samples = self._signal(experiment)
         self._stamps = experiment.stamps_ns
         self._window_ns = topics.stamp_ns(self.values["window"], experiment.sample_rate_hz)
-        self._chunk = max(1, self.values["window"] // 4)
-        self._sent = 0
+        self._burst = max(1, min(self.values["window"] // 4, _BURST))
+        self._sent = self._sent_ns = self._passed_ns = self._next_ns = 0
         self._untaken = self._stream_taken is not None
-        self._stream(0)
+        self.on_time(time.monotonic_ns())
         # The description makes the simulator start: never before the controller has left the old
         # reference, or it would answer the first position with that.
         description = String(data=experiment.to_json())
-        self.wait_until(self._untaken_by, lambda: self._description.publish(description))
+        self.wait_until(self._unready, lambda: self._description.publish(description))
+
+    def _unready(self) -> str | None:
+        return self._untaken_by() or (None if self.due_ns == NEVER else "the first window")
 
     def health(self) -> Health:
         """Return how much of the reference is streamed."""
@@ -168,19 +181,19 @@ class ExcitationNode(ros.RigNode):
             values={"samples streamed": self._sent, "samples": int(self._stamps.size)},
         )
 
-    def _stream(self, passed_ns: int) -> None:
-        """Publish what lies within the window beyond the pace, in whole chunks."""
-        total = self._stamps.size
-        while self._sent < total:
-            end = min(self._sent + self._chunk, total)
-            self._due_ns = int(self._stamps[end - 1]) - self._window_ns
-            if passed_ns < self._due_ns:
-                return
-            part = slice(self._sent, end)
-            for message in self._encode(self._stamps[part], self._samples[part]):
-                self._reference.publish(message.tobytes())
-            self._sent, self._sent_ns = end, int(self._stamps[end - 1])
-        self._due_ns = self._sent_ns + 1
+    def on_time(self, now_ns: int) -> None:
+        """Publish one burst if it lies within the window beyond the pace; look again soon."""
+        if self._passed_ns < self._next_ns:
+            self.due_ns = NEVER
+            return
+        part = slice(self._sent, self._sent + self._burst)
+        stamps = self._stamps[part]
+        for message in self._encode(stamps, self._samples[part]):
+            self._reference.publish(message.tobytes())
+        self._sent, self._sent_ns = self._sent + stamps.size, int(stamps[-1])
+        following = self._stamps[self._sent : self._sent + self._burst]
+        self._next_ns = int(following[-1]) - self._window_ns if following.size else NEVER
+        self.due_ns = now_ns + _PAUSE_NS
 
 
 def main() -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import time
+from collections.abc import Collection
 from types import TracebackType
 from typing import Any
 
@@ -20,12 +21,12 @@ from fjr_interface.errors import InputError
 from fjr_interface.topics import NAMESPACE
 
 from .domain import reach
+from .processes import NODES
 
-_FIND_S = 4.0
+_FIND_S = 5.0
 _ANSWER_S = 5.0
 _AGAIN_S = 1.0  # an answer may be lost while the two are finding each other
 _FOUND_S = 0.1
-_DIAGNOSTICS_S = 1.2  # they come once a second
 _POLL_S = 0.02
 _LEVELS = ("ok", "WARN", "ERROR", "stale")
 
@@ -104,20 +105,24 @@ class Rig:
             heard.update({k: v for k, v in statuses.items() if k.startswith(f"{NAMESPACE[1:]}/")})
 
         subscription = self._node.create_subscription(DiagnosticArray, "/diagnostics", hear, 10)
-        began = time.monotonic()
-        while (passed_s := time.monotonic() - began) < _FIND_S:
+        until = time.monotonic() + _FIND_S
+        while time.monotonic() < until and not self._all_in(heard):
             self._executor.spin_once(timeout_sec=_POLL_S)
-            if passed_s > _DIAGNOSTICS_S and 0 < self._diagnosed() <= len(heard):
-                break
         self._node.destroy_subscription(subscription)
         if not heard:
             raise InputError(self._not_found("no node publishes diagnostics"))
         return [heard[name] for name in sorted(heard)]
 
-    def _diagnosed(self) -> int:
-        """Return how many nodes of the rig publish diagnostics."""
+    def _all_in(self, heard: Collection[str]) -> bool:
+        """Return whether a whole rig, and whoever else is found, has been heard.
+
+        While one of its nodes is missing nobody knows whether it is there: nodes of a busy rig are
+        found a second or more after each other.
+        """
+        nodes = {name.split(":")[0].rpartition("/")[2] for name in heard}
         writers = self._node.get_publishers_info_by_topic("/diagnostics")
-        return sum(writer.node_namespace == NAMESPACE for writer in writers)
+        found = sum(writer.node_namespace == NAMESPACE for writer in writers)
+        return nodes >= set(NODES) and found <= len(heard)
 
     def _not_found(self, what: str) -> str:
         domain = os.environ.get("ROS_DOMAIN_ID") or "0"

@@ -21,16 +21,9 @@ from fjr_interface.topics import NAMESPACE, SIGNALS
 
 from .campaign import Campaign, bag_folder
 from .interruption import Interruption
-from .processes import ProcessGroup
+from .processes import NODES, ProcessGroup
 from .progress import CampaignProgress
 from .recorder import Recorder
-
-NODES = {
-    "simulator": "fjr_sim_node",
-    "controller": "controller_node",
-    "excitation": "excitation_node",
-}
-"""Node name and the module that runs it."""
 
 _POLL_S = 0.01
 _START_S = 90.0  # the very first start compiles the physics

@@ -9,10 +9,10 @@ from typing import Any
 from fjr_interface.parameter_file import save_parameter_file
 
 from .campaign import CAMPAIGN_FILE, Campaign
-from .conductor import NODES, Conductor
+from .conductor import Conductor
 from .domain import claimed_domain, reach
 from .interruption import Interruption
-from .processes import ProcessGroup
+from .processes import NODES, ProcessGroup
 from .progress import CampaignProgress
 
 ROLES: dict[str, dict[str, Any]] = {

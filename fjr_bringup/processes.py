@@ -15,6 +15,13 @@ from types import TracebackType
 
 from fjr_interface.errors import InputError
 
+NODES = {
+    "simulator": "fjr_sim_node",
+    "controller": "controller_node",
+    "excitation": "excitation_node",
+}
+"""Node name and the module that runs it."""
+
 _PR_SET_PDEATHSIG = 1
 _GRACE_S = 2.0
 _LAST_LINES = 5

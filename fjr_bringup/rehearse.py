@@ -20,11 +20,10 @@ from fjr_sim_node.faults import NODE, FaultPlan
 from fjr_sim_node.simulator import run_realization
 
 from .campaign import CAMPAIGN_FILE, bag_folder
-from .conductor import NODES
 from .domain import claimed_domain, reach
 from .graph_run import ros_arguments, save_roles
 from .interruption import Interruption
-from .processes import ProcessGroup
+from .processes import NODES, ProcessGroup
 from .rehearsal_conductor import Killing, Played, RehearsalConductor
 from .rehearsal_limits import judge
 from .rehearsal_prediction import predict

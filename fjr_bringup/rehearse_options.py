@@ -19,7 +19,7 @@ from fjr_interface.real_time import REAL_TIME
 from fjr_sim_node.faults import NODE, FaultPlan, as_text
 
 from .campaign import GROUPS, Campaign
-from .conductor import NODES
+from .processes import NODES
 from .rehearsal_limits import LimitsFile
 
 SIMULATED, EXTERNAL = "simulated", "external"

@@ -17,11 +17,11 @@ from rich.console import Console
 from fjr_interface.errors import InputError
 from fjr_interface.parameter_file import save_parameter_file
 
-from .conductor import NODES, Conductor
+from .conductor import Conductor
 from .domain import claimed_domain, reach
 from .graph_run import ROLES, start_nodes
 from .interruption import Interruption
-from .processes import ProcessGroup
+from .processes import NODES, ProcessGroup
 from .progress import CampaignProgress
 from .replay_comparison import compare, print_table, report, write_report
 from .replay_plan import CONTROLLER, LOOP, PLANT, ReplayPlan

@@ -70,7 +70,6 @@ def test_pause_step_speed_reset_stop_and_play_by_the_command(start, rig):  # noq
     np.testing.assert_array_equal(torque, batch.torque)
 
 
-@pytest.mark.skip(reason="fails since branches were merged; cause not found yet")
 def test_an_emergency_stop_holds_zero_torque_until_it_is_released(start, rig):  # noqa: F811
     from diagnostic_msgs.msg import DiagnosticArray
     from std_srvs.srv import Trigger
@@ -158,23 +157,18 @@ def test_without_positions_the_controller_takes_the_torque_down_and_so_does_its_
     assert simulator.interrupt() == 0
 
 
-@pytest.mark.skip(reason="fails since branches were merged; cause not found yet")
 def test_the_drive_lets_go_of_a_killed_controller_and_its_successor_plays_the_next_start(
     start,
     rig,  # noqa: F811
 ):
     from diagnostic_msgs.msg import DiagnosticArray
-    from std_msgs.msg import String
     from std_srvs.srv import Trigger
-
-    from fjr_interface import ros
 
     def figure(name: str) -> float:
         values = [v for m in heard for s in m.status for v in s.values if v.key == name]
         return float(values[-1].value) if values else 0.0
 
     heard = rig.peer.listen(DiagnosticArray, "/diagnostics", 100)
-    controllers = rig.peer.listen(String, "controller", ros.EXPERIMENT_QOS)
     nodes = in_real_time(start, periods=500)
     nodes["s"]()
     controller = nodes["c"]()
@@ -182,9 +176,9 @@ def test_the_drive_lets_go_of_a_killed_controller_and_its_successor_plays_the_ne
     rig.peer.spin_until(lambda: len(rig.torque) > 200, "torques")
     controller.process.kill()
     rig.peer.spin_until(lambda: figure("let go") >= 1, "the drive to let go")
-    rig.torque.clear(), controllers.clear()
+    rig.torque.clear()
     controller = nodes["c"]()
-    rig.peer.spin_until(lambda: controllers, "the new controller")
+    controller.wait_for_text("Waiting for a new realization: the one under way began without")
     assert rig.peer.call(Trigger, "excitation/start", Trigger.Request()).success
     rig.peer.spin_until(lambda: len(rig.torque) > 100, "torques of a new run")
     assert stamp_ns(rig.torque[0]) <= 50_000_000
@@ -236,7 +230,6 @@ class Progress(CampaignProgress):
         self.said += sentence
 
 
-@pytest.mark.skip(reason="fails since branches were merged; cause not found yet")
 def test_a_paused_campaign_is_not_called_hung(domain, tmp_path, start, monkeypatch):
     def pause_until_it_is_noticed() -> None:
         assert fjr(start, "pause").startswith("paused: ")
@@ -253,7 +246,7 @@ def test_a_paused_campaign_is_not_called_hung(domain, tmp_path, start, monkeypat
 
 
 def test_a_realization_with_a_trip_is_not_kept(domain, tmp_path, start):
-    what = campaign(base=0.1, excitation={"f_min_hz": 1.0, "f_max_hz": 40.0})
+    what = campaign(base=0.04, excitation={"f_min_hz": 1.0, "f_max_hz": 40.0})
     helper = Helper(tmp_path / "graph", lambda: fjr(start, "estop"))
     with pytest.raises(InputError, match="not kept: the controller tripped: emergency stop"):
         in_graph(what, tmp_path / "graph")

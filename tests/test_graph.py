@@ -144,10 +144,10 @@ def test_a_dead_or_hung_node_is_named_and_all_others_end(
 
 def test_a_node_that_ends_at_its_start_is_named_with_what_it_said(domain, tmp_path, monkeypatch):
     monkeypatch.setitem(MODULES, "simulator", "fjr_sim_node")
-    from fjr_bringup import conductor, graph_run
+    from fjr_bringup import graph_run, processes
 
-    monkeypatch.setitem(graph_run.NODES, "simulator", "fjr_sim_node.no_such_module")
-    assert graph_run.NODES is conductor.NODES
+    monkeypatch.setitem(processes.NODES, "simulator", "fjr_sim_node.no_such_module")
+    assert graph_run.NODES is processes.NODES
     with pytest.raises(InputError, match=r"The simulator node ended with status 1; its last lines"):
         in_graph(campaign(), tmp_path / "campaign")
 
