@@ -122,8 +122,13 @@ Law = np.ndarray | TransferFunction
 """A control law that can be simulated: coefficients of `pd_filtered`, or a transfer function."""
 
 
-def law_of(controller: Mapping[str, Any], sample_rate_hz: float) -> Law:
-    """Return the law of the `controller` entry of an experiment description, of any known kind."""
+def law_of(controller: Mapping[str, Any] | None, sample_rate_hz: float) -> Law:
+    """Return the law of the `controller` entry of an experiment description, of any known kind.
+
+    Raises:
+        InputError: there is no such entry, it is of no known kind, or its values are bad.
+    """
+    controller = controller or {}
     if controller.get("kind") == KIND:
         return from_description(controller)
     return pd_filtered.coefficients(pd_filtered.from_description(controller, sample_rate_hz))

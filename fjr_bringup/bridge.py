@@ -92,7 +92,7 @@ class ServingBridge(ros.RigNode):
         if reference:
             self._hear(topics.REFERENCE.topic, self._on_reference)
         if echo:
-            self.create_timer(_RESEND_S, self._send_again)
+            self.call_every(_RESEND_S, self._send_again)
 
     def _hear(self, topic, callback):
         return self.create_subscription(JointState, topic, callback, ros.SIGNAL_QOS, raw=True)

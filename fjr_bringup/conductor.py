@@ -28,6 +28,7 @@ from .recorder import Recorder
 _POLL_S = 0.01
 _START_S = 90.0  # the very first start compiles the physics
 _ANSWER_S = 1.0
+_TRY_S = 10.0
 _STALL_S = 8.0  # a message that DDS must repeat comes after 3 s
 _PREPARATION_S = 5e-6  # for each sample: the nodes make reference and noise before the first one
 
@@ -76,27 +77,31 @@ class Conductor:
         A node that answers has matched what was announced before the client that asks it: the
         recorder's subscriptions and the other clients.
         """
-        until = time.monotonic() + _START_S
-        for node in self._nodes:
-            self._wait_for_answer(node, until)
+        self._wait_for_answers()
+        until = time.monotonic() + _STALL_S
         while self._recorder.unwritten or not self._start.service_is_ready():
             self._wait_a_moment(until, "excitation")
         self._refuse_others()
 
-    def _wait_for_answer(self, node: str, until: float) -> None:
+    def _wait_for_answers(self) -> None:
+        for node in self._nodes:
+            until = time.monotonic() + _START_S
+            while not self._answers(node, until):
+                pass
+
+    def _answers(self, node: str, until: float) -> bool:
+        """Return whether a node answers soon; the next try is made by a client found anew."""
         client = self._node.create_client(GetParameters, f"{node}/get_parameters")
-        answered = False
-        while not answered:
-            if not client.service_is_ready():
-                self._wait_a_moment(until, node)
-                continue
+        future, asked = None, 0.0
+        patience = time.monotonic() + _TRY_S
+        while not (future and future.done()) and time.monotonic() < patience:
             # A node that has not matched the client yet drops its answer: ask again.
-            future = client.call_async(GetParameters.Request(names=["joint"]))
-            patience = time.monotonic() + _ANSWER_S
-            while not future.done() and time.monotonic() < patience:
-                self._wait_a_moment(until, node)
-            answered = future.done()
+            if client.service_is_ready() and time.monotonic() > asked + _ANSWER_S:
+                asked = time.monotonic()
+                future = client.call_async(GetParameters.Request(names=["joint"]))
+            self._wait_a_moment(until, node)
         self._node.destroy_client(client)
+        return bool(future and future.done())
 
     def _refuse_others(self) -> None:
         for signal in SIGNALS:

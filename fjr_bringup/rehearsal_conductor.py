@@ -104,9 +104,7 @@ class RehearsalConductor(Conductor):
         What trips before a real drive stays tripped until a person releases it.
         """
         if self._restarted:  # one that has not found our clients yet drops its answers
-            until = time.monotonic() + _START_S
-            for node in self._nodes:
-                self._wait_for_answer(node, until)
+            self._wait_for_answers()
         self._ask("release")
         on_wire = plan is not None and plan.fault.acts_on != NODE
         text = as_text(plan) if plan is not None and on_wire else NO_FAULT

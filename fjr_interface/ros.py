@@ -111,8 +111,8 @@ class RigNode(Node):
         self.add_on_set_parameters_callback(self._refuse_bad_values)
         self.add_post_set_parameters_callback(self._take_values)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
-        self.create_timer(_PATIENCE_S, self._say_what_is_waited_for)
-        self.create_timer(_DIAGNOSTICS_S, self.diagnose)
+        self.call_every(_PATIENCE_S, self._say_what_is_waited_for)
+        self.call_every(_DIAGNOSTICS_S, self.diagnose)
 
     def check(self, values: Values) -> None:
         """Raise InputError if values, each of them good, don't go together."""
@@ -121,19 +121,19 @@ class RigNode(Node):
         """Do what a change of `values` asks for."""
 
     def create_subscription(
-        self, message_type: type, topic: str, callback: Callable[[Any], None], *args: Any, **kw: Any
+        self, msg_type: Any, topic: str, callback: Callable[[Any], None], *args: Any, **kw: Any
     ) -> Subscription:
         """Subscribe; an InputError in the callback ends the node with that sentence."""
         guarded = self._guard(callback)
-        return super().create_subscription(message_type, topic, guarded, *args, **kw)
+        return super().create_subscription(msg_type, topic, guarded, *args, **kw)
 
-    def create_timer(self, period_s: float, callback: Callable[[], None], **kw: Any) -> Timer:
+    def call_every(self, period_s: float, callback: Callable[[], None]) -> Timer:
         """Create a timer of the machine's time, whatever clock the node is told to use.
 
         An InputError in the callback ends the node with that sentence.
         """
         clock = Clock(clock_type=ClockType.STEADY_TIME)
-        return super().create_timer(period_s, self._guard(callback), clock=clock, **kw)
+        return self.create_timer(period_s, self._guard(callback), clock=clock)
 
     def create_trigger(self, name: str, do: Callable[[], tuple[bool, str]]) -> None:
         """Offer a service of type std_srvs/Trigger; `do` returns success and message.
@@ -206,7 +206,7 @@ class RigNode(Node):
                 self.stop_waiting()
                 then()
 
-        self._wait = self.create_timer(period_s, look)
+        self._wait = self.call_every(period_s, look)
         look()
 
     def stop_waiting(self) -> None:

@@ -133,7 +133,8 @@ def _response(realizations: list[Signals], lines: Lines, base_frequency_hz: floa
     spectra = [_spectra(signals, lines, base_frequency_hz) for signals in realizations]
     unknown = np.full(lines.excited.size, np.nan)
     if len(spectra) > 1 or spectra[0].periods > 1:
-        bla = robust_bla(spectra, lines.excited) if len(spectra) > 1 else fast_bla(*spectra, lines)
+        robust = len(spectra) > 1
+        bla = robust_bla(spectra, lines.excited) if robust else fast_bla(spectra[0], lines)
         g, radius, sigma = bla.g, bla.radius_95, np.sqrt(bla.var_total)
     else:
         g = spectra[0].position[lines.excited] / spectra[0].torque[lines.excited]

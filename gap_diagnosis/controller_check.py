@@ -48,7 +48,7 @@ def check_controller(realization: Realization) -> ControllerCheck:
     description = realization.experiment
     described = law_of(description.controller, description.sample_rate_hz)
     law = as_transfer_function(described)
-    error = (realization.reference - realization.position).ravel()
+    error = (realization.played - realization.position).ravel()
     torque = realization.torque.ravel()
     unlimited = _unlimited(described, error)
     start = _forgotten(law.slowest_pole, error.size)
@@ -56,7 +56,7 @@ def check_controller(realization: Realization) -> ControllerCheck:
         start = 0
         unlimited += _entered(law, torque - unlimited, np.abs(torque) < law.limit_nm)
     expected = np.clip(unlimited, -law.limit_nm, law.limit_nm)
-    size = max(np.abs(realization.reference).max(), np.abs(realization.position).max())
+    size = max(np.abs(realization.played).max(), np.abs(realization.position).max())
     impulse = lfilter(law.numerator, law.denominator, np.eye(1, error.size)[0])
     gain = float(np.abs(impulse).max() + np.abs(np.diff(impulse)).sum())
     tolerance = float(SINGLE_ROUNDING * (np.abs(torque).max() + gain * size))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -167,7 +168,7 @@ class Fitter:
             parent.solution,
             parent.model,
             starts(effect, self.peak_torque_nm, cycles),
-            lambda seed: self._space(parent, seed),
+            partial(self._space, parent),
             self._errors,
         )
 
@@ -223,7 +224,7 @@ class Fitter:
                 fit.solution,
                 fit.model,
                 [{ratio: 0.2, phase: angle} for angle in (0.0, 0.5 * np.pi)],
-                lambda seed, parent=fit: self._space(parent, seed),
+                partial(self._space, fit),
                 self._errors,
             ).proposals()
             if not found or found[0][0] > _NO_PROMISE * fit.train_chi2:

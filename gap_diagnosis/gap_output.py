@@ -95,7 +95,7 @@ def updated_values(investigation: Investigation) -> dict[str, dict[str, Any]]:
         "excitation": {"sample_rate_hz": rate, **_excitation(recorded)},
     }
     if has_known_law(recorded):
-        values["controller"] = from_description(description.controller, rate)
+        values["controller"] = from_description(description.controller or {}, rate)
     return values
 
 

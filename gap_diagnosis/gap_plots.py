@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -58,7 +58,7 @@ def where_plot(maps: Mapping[str, ResidualMap], signal: Signal) -> Plot:
 
 
 def _map_trace(
-    found: ResidualMap, signal: Signal, rows: list[tuple[int, str]], number: int, count: int
+    found: ResidualMap, signal: Signal, rows: Sequence[tuple[int, str]], number: int, count: int
 ) -> Trace:
     x, y, color, text = [], [], [], []
     part = found.signals[signal]
@@ -184,7 +184,9 @@ def torque_plot(before: ResidualTorque, after: ResidualTorque | None, level: int
         directions = (0,) if coordinate == "velocity" else (1, -1)
         stages = ((after, "best explanation", "--noise"), (before, "after the refit", "--excited"))
         for residual, name, color in stages:
-            for direction in directions if residual is not None else ():
+            if residual is None:
+                continue
+            for direction in directions:
                 found = curve(residual, coordinate, direction, level)
                 options: Options = {"row": row}
                 options["dash"] = "dot" if direction < 0 else "solid"

@@ -195,7 +195,7 @@ def _reference(recorded: RecordedExperiment) -> Gate:
         return _untested("reference repeats", "a recorded reference")
 
     def mismatch(r: Realization) -> float:
-        kept = r.kept(r.reference)
+        kept = r.kept(r.played)
         scale = np.std(kept[-1])
         return float(np.std(kept - kept[-1]) / scale) if scale else np.inf
 

@@ -102,6 +102,6 @@ def _outputs(recorded: RecordedExperiment, index: int) -> np.ndarray:
     """Return the mean spectra of y, and of q if all realizations have it, (outputs, lines)."""
     realization = recorded.realizations[index]
     signals = [realization.position]
-    if recorded.has_link:
+    if recorded.has_link and realization.link is not None:
         signals.append(realization.link)
     return np.array([realization.spectrum(s, recorded.lines).mean(axis=0) for s in signals])

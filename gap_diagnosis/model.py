@@ -107,7 +107,7 @@ class Simulator:
         if self.repeats:
             self._law = law_of(description.controller, self.sample_rate_hz)
         else:
-            self._law = prediction.observer(recorded)
+            self._observer = prediction.observer(recorded)
         self._periods = max(description.transient_periods, 1) + 1
         self._inputs = [self._mean_inputs(realization) for realization in recorded.realizations]
         run_s = description.samples / self.sample_rate_hz
@@ -159,7 +159,7 @@ class Simulator:
         """Return what drives the simulation, periods after each other: r, or y and u."""
         samples = self._periods * self._samples
         if self.repeats:
-            return (np.resize(realization.reference.ravel(), samples),)
+            return (np.resize(realization.played.ravel(), samples),)
         signals = (realization.position, realization.torque)
         return tuple(np.resize(realization.kept(s).mean(axis=0), samples) for s in signals)
 
@@ -184,10 +184,11 @@ class Simulator:
     ) -> Trajectory:
         p, e = model.plant_coefficients, model.effect_coefficients
         if self.repeats:
-            return simulate(*inputs, self.sample_rate_hz, p, self._law, None, e, elapsed_s)
+            (reference,) = inputs
+            return simulate(reference, self.sample_rate_hz, p, self._law, None, e, elapsed_s)
         position, torque = inputs
         speed = (position[1] - position[0]) * self.sample_rate_hz
         return simulate_law(
-            position, self.sample_rate_hz, p, self._law, None, e, elapsed_s,
+            position, self.sample_rate_hz, p, self._observer, None, e, elapsed_s,
             added_torque=torque, start=(float(position[0]), float(speed)),
         )  # fmt: skip

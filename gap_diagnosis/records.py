@@ -48,6 +48,12 @@ class Realization:
         """Index of the excitation level."""
         return self.experiment.level
 
+    @property
+    def played(self) -> np.ndarray:
+        """The reference, where it is known to be recorded."""
+        assert self.reference is not None
+        return self.reference
+
     def kept(self, signal: np.ndarray) -> np.ndarray:
         """Return the kept periods of one of the signals, (P, N)."""
         return signal[self.experiment.transient_periods :]
@@ -157,8 +163,11 @@ def _cut(reader: BagReader, number: int) -> Realization:
         experiment = _discovered(reader.path, number, record, reader.sample_rate_hz)
     shape = (-1, experiment.samples_per_period)
     signals = (record.reference, record.torque, record.position, record.link)
-    cut = (None if s is None else s[: experiment.samples].reshape(shape) for s in signals)
-    return Realization(reader.path.name, experiment, *cut)
+    reference, torque, position, link = (
+        None if s is None else s[: experiment.samples].reshape(shape) for s in signals
+    )
+    assert torque is not None and position is not None  # no bag is read without them
+    return Realization(reader.path.name, experiment, reference, torque, position, link)
 
 
 def _reference_optional(signal_map: SignalMap) -> SignalMap:

@@ -84,7 +84,7 @@ def _motion(
     law = as_transfer_function(law_of(description.controller, description.sample_rate_hz))
     powers = z[:, None] ** -np.arange(law.numerator.size)
     controller = (powers @ law.numerator) / (powers @ law.denominator)
-    r = [recorded.realizations[i].reference[-1] for i in misfit.which]
+    r = [recorded.realizations[i].played[-1] for i in misfit.which]
     loop = spectrum(y, lines.size) / (spectrum(np.array(r), lines.size) + 1e-300)
     response = np.array([_between(lines, excited, row[excited]) for row in loop]) / controller
     p, s = model.plant, 2j * np.pi * lines * description.base_frequency_hz

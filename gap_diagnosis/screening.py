@@ -154,7 +154,9 @@ def _candidates(
             found.append(_Candidate(seed, changes[members[0]], size, gain))
             continue
         size = float(np.hypot(*weights)) or 1.0
-        phase = {_phase_name(seeds[members[0]]): float(np.arctan2(weights[1], weights[0]))}
+        name = _phase_name(seeds[members[0]])
+        assert name is not None  # two seeds of one shape differ in it
+        phase = {name: float(np.arctan2(weights[1], weights[0]))}
         change = (weights @ changes[members]) / size
         found.append(_Candidate({**seeds[members[0]], **phase}, change, size, gain))
     return found

@@ -97,12 +97,12 @@ class _Base:
         amplitudes = recorded.amplitudes_rad
         rows = [int(np.argmin(amplitudes)), int(np.argmax(amplitudes))]
         low, high = (_periods(recorded, recorded.levels[row]) for row in rows)
-        sizes = (float(amplitudes[row]) for row in rows)
-        return cls(low, high, *sizes, recorded.lines, recorded)
+        low_rad, high_rad = (float(amplitudes[row]) for row in rows)
+        return cls(low, high, low_rad, high_rad, recorded.lines, recorded)
 
 
 def _periods(recorded: RecordedExperiment, level: int) -> np.ndarray:
-    members = [r.reference[-1] for r in recorded.realizations if r.level == level]
+    members = [r.played[-1] for r in recorded.realizations if r.level == level]
     return np.array(members[:_REALIZATIONS])
 
 
