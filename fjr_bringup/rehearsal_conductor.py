@@ -27,7 +27,6 @@ from .rehearsal_recorder import RehearsalRecorder
 from .rehearsal_timing import loop_timing
 
 _POLL_S = 0.01
-_START_S = 60.0
 _SHOW_S = 1.0
 _REST_S = 2.0
 _AFTER_S = 1.0  # for the last torque, and for a drive whose clock is slower

@@ -100,7 +100,7 @@ def by_hand(start: Starter, **more: Any) -> dict[str, Any]:
     }
 
 
-@pytest.mark.parametrize("order", map("".join, itertools.permutations("sce")), ids=str)
+@pytest.mark.parametrize("order", list(map("".join, itertools.permutations("sce"))), ids=str)
 def test_nodes_started_in_any_order_play_the_experiment(start, rig, order):
     nodes = by_hand(start)
     started = [nodes[letter]() for letter in order]

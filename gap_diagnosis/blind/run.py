@@ -19,11 +19,11 @@ import subprocess
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 from fjr_interface.errors import InputError
+from fjr_interface.installed import product_version
 
 from .cases import Answer
 from .files import (
@@ -81,7 +81,7 @@ class BlindCheck:
         check = secrets.token_hex(8)
         Secret.draw(seed).save(check)
         values = {"schema": SCHEMA, "check": check, "cases": count, "methods": list(methods)}
-        write_json(manifest, {**values, "version": _version()})
+        write_json(manifest, {**values, "version": product_version()})
         return cls.open(folder)
 
     @classmethod
@@ -246,10 +246,3 @@ def _have_made(order: dict[str, Any], made: Callable[[str, int], None]) -> None:
     if process.returncode:
         last = problem.splitlines()[-1] if problem else f"status {process.returncode}"
         raise InputError(f"The cases could not be made: {last}")
-
-
-def _version() -> str:
-    try:
-        return version("fjr-rig")
-    except PackageNotFoundError:
-        return "unknown"
