@@ -22,9 +22,9 @@ from machine import describe
 
 from fjr_bringup.domain import claimed_domain
 from fjr_bringup.interruption import Interruption
-from fjr_bringup.rehearsal_progress import RehearsalProgress
-from fjr_bringup.rehearse import Graph, judged
-from fjr_bringup.rehearse_options import Options, Plan, check_options
+from fjr_bringup.rehearsal.options import Options, Plan, check_options
+from fjr_bringup.rehearsal.progress import RehearsalProgress
+from fjr_bringup.rehearsal.rehearse import Graph, judged
 from fjr_sim_node.faults import CATALOGUE, CONTINUES, Fault, FaultPlan
 
 EXPERIMENT = {"base_frequency_hz": 1.0, "f_min_hz": 1.0}

@@ -20,8 +20,8 @@ from pathlib import Path
 import numpy as np
 from machine import describe
 
-from fjr_bringup.rehearsal_progress import RehearsalProgress
-from fjr_bringup.rehearsal_timing import Distribution
+from fjr_bringup.rehearsal.progress import RehearsalProgress
+from fjr_bringup.rehearsal.timing import Distribution
 
 RATE_HZ = 500.0
 TARGET_P99_S = 2e-3
@@ -30,8 +30,8 @@ _MOST_PING_PONG_S = 120.0
 
 def loop(duration_s: float) -> bool:
     """Rehearse, print what was measured, and return whether the target is reached."""
-    from fjr_bringup.rehearse import rehearse
-    from fjr_bringup.rehearse_options import Options
+    from fjr_bringup.rehearsal.options import Options
+    from fjr_bringup.rehearsal.rehearse import rehearse
 
     with tempfile.TemporaryDirectory() as folder, RehearsalProgress() as progress:
         overrides = {} if duration_s >= 20.0 else {"excitation": {"base_frequency_hz": 1.0,

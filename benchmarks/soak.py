@@ -32,7 +32,7 @@ from machine import describe
 from fjr_bringup.batch_run import simulate_campaign
 from fjr_bringup.campaign import CAMPAIGN_FILE, Campaign
 from fjr_bringup.progress import CampaignProgress
-from fjr_bringup.rehearse import judged
+from fjr_bringup.rehearsal.rehearse import judged
 from fjr_sim_node.faults import CATALOGUE
 
 MARK = f"FJR_SOAK={uuid.uuid4().hex}"

@@ -14,17 +14,17 @@ import typer
 
 from . import (
     blind_commands,
-    bridge_commands,
     by_hand_commands,
     diagnose_commands,
     paper_commands,
     plan_commands,
-    rehearse_commands,
-    replay_commands,
     run_commands,
     search_commands,
 )
+from .bridge import commands as bridge
 from .guard import guarded
+from .rehearsal import commands as rehearsal
+from .replay import commands as replay
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -180,14 +180,14 @@ def import_records(
 
 
 run_commands.add_to(app)
-rehearse_commands.add_to(app)
+rehearsal.add_to(app)
 search_commands.add_to(app)
 plan_commands.add_to(app)
 paper_commands.add_to(app)
 blind_commands.add_to(app)
 diagnose_commands.add_to(app)
-bridge_commands.add_to(app)
-replay_commands.add_to(app)
+bridge.add_to(app)
+replay.add_to(app)
 by_hand_commands.add_to(app)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fjr_bringup.rehearsal_timing import RECORD
+from fjr_bringup.rehearsal.timing import RECORD
 
 RATE = 500.0
 PERIOD_NS = 2_000_000

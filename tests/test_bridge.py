@@ -20,7 +20,7 @@ from ros_domain import Peer, Started, Starter
 
 from controller_node import pd_filtered
 from excitation_node import multisine
-from fjr_bringup.bridge_mapping import Answers, Command, CommandReader, Observer, Sample
+from fjr_bringup.bridge.mapping import Answers, Command, CommandReader, Observer, Sample
 from fjr_interface.bag_reader import read_record
 from fjr_interface.errors import InputError
 from fjr_interface.experiment import Experiment

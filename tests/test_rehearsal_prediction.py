@@ -8,9 +8,9 @@ from loop_messages import loop
 
 from controller_node import pd_filtered
 from excitation_node import multisine
-from fjr_bringup.rehearsal_limits import LIMITS, judge
-from fjr_bringup.rehearsal_prediction import bla_bias, predict
-from fjr_bringup.rehearsal_timing import loop_timing
+from fjr_bringup.rehearsal.limits import LIMITS, judge
+from fjr_bringup.rehearsal.prediction import bla_bias, predict
+from fjr_bringup.rehearsal.timing import loop_timing
 from fjr_sim_node.simulator import SIMULATOR, run_realization
 
 RATE = 1000.0

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from loop_messages import RATE, loop
 
-from fjr_bringup import rehearsal_tables
-from fjr_bringup.rehearsal_limits import LIMITS, judge
-from fjr_bringup.rehearsal_report import render
-from fjr_bringup.rehearsal_result import Rehearsal, to_json
-from fjr_bringup.rehearsal_timing import RECORD, loop_timing
+from fjr_bringup.rehearsal import tables
+from fjr_bringup.rehearsal.limits import LIMITS, judge
+from fjr_bringup.rehearsal.report import render
+from fjr_bringup.rehearsal.result import Rehearsal, to_json
+from fjr_bringup.rehearsal.timing import RECORD, loop_timing
 
 TEXT = "<script>&'\""
 
@@ -78,6 +78,6 @@ def test_report_shows_the_verdict_and_escapes_what_is_not_ours():
 
 def test_the_document_lists_the_present_limits_and_faults():
     text = (Path(__file__).parents[1] / "docs/rehearsal.md").read_text(encoding="utf-8")
-    assert rehearsal_tables.in_step(text) == text, (
-        "renew it: python -m fjr_bringup.rehearsal_tables docs/rehearsal.md"
+    assert tables.in_step(text) == text, (
+        "renew it: python -m fjr_bringup.rehearsal.tables docs/rehearsal.md"
     )

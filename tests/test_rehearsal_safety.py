@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from loop_messages import EPOCH_NS, grid, messages
 
-from fjr_bringup.rehearsal_safety import onset_ns, safe_state
+from fjr_bringup.rehearsal.safety import onset_ns, safe_state
 from fjr_sim_node.faults import FaultPlan
 
 SAMPLES = 1500

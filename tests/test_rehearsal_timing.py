@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from loop_messages import PERIOD_NS, RATE, grid, loop, messages
 
-from fjr_bringup.rehearsal_limits import LIMITS, LimitsFile, go, judge
-from fjr_bringup.rehearsal_timing import EDGES_S, RECORD, Distribution, loop_timing, topic_timing
+from fjr_bringup.rehearsal.limits import LIMITS, LimitsFile, go, judge
+from fjr_bringup.rehearsal.timing import EDGES_S, RECORD, Distribution, loop_timing, topic_timing
 from fjr_interface.errors import InputError
 
 

@@ -15,11 +15,11 @@ from ros_domain import Starter, marked_processes, wait_for
 
 from fjr_bringup.domain import claimed_domain
 from fjr_bringup.interruption import Interruption
-from fjr_bringup.rehearsal_progress import RehearsalProgress
-from fjr_bringup.rehearsal_recorder import ARRIVALS, NAMES
-from fjr_bringup.rehearse import Graph, distance, judged
-from fjr_bringup.rehearse_commands import NO_GO
-from fjr_bringup.rehearse_options import EXTERNAL, Options, check_options
+from fjr_bringup.rehearsal.commands import NO_GO
+from fjr_bringup.rehearsal.options import EXTERNAL, Options, check_options
+from fjr_bringup.rehearsal.progress import RehearsalProgress
+from fjr_bringup.rehearsal.recorder import ARRIVALS, NAMES
+from fjr_bringup.rehearsal.rehearse import Graph, distance, judged
 from fjr_interface.bag_reader import audit
 from fjr_interface.errors import InputError
 from fjr_sim_node.faults import CATALOGUE, NO_TORQUE, NODE, FaultPlan

@@ -16,7 +16,7 @@ from controller_node.transfer_function import TransferFunction
 from fjr_bringup.batch_run import simulate_campaign
 from fjr_bringup.campaign import Campaign
 from fjr_bringup.progress import CampaignProgress
-from fjr_bringup.replay_plan import plan_replay
+from fjr_bringup.replay.plan import plan_replay
 from fjr_interface.bag_reader import read_record
 from fjr_interface.experiment import Experiment
 from fjr_sim_node import effects, plant
@@ -44,7 +44,7 @@ def batch(folder: Path, what: Campaign) -> Path:
 
 def replayed(bag: Path, into: str, out: Path, *settings: str) -> tuple[dict[str, Any], Path]:
     """Replay a bag; return replay.json and the recorded bag."""
-    from fjr_bringup.replay_graph import replay_into
+    from fjr_bringup.replay.graph import replay_into
 
     path = replay_into(plan_replay(bag, into, settings=settings), out)
     assert path == out / "replay.json"
@@ -201,10 +201,10 @@ def test_a_stand_in_says_what_is_wrong_with_its_bag(start: Starter, tmp_path):
     mcap = tmp_path / "half" / f"{bag.name}.mcap"
     mcap.write_bytes(mcap.read_bytes()[:-500])
     for module in ("excitation", "controller", "simulator"):
-        node = start.node(f"fjr_bringup.replay_{module}", bag=tmp_path / "half")
+        node = start.node(f"fjr_bringup.replay.{module}", bag=tmp_path / "half")
         assert node.exit_status() == 2
         assert "error: " in node.output and "the recording was cut off" in node.output
-    node = start.node("fjr_bringup.replay_simulator")
+    node = start.node("fjr_bringup.replay.simulator")
     assert node.exit_status() == 2
     assert "error: The parameter bag is empty; give the folder of the bag" in node.output
 
@@ -215,7 +215,7 @@ def test_a_stand_in_refuses_the_experiment_of_another_bag(start: Starter, peer, 
     from fjr_interface import ros
 
     bag = batch(tmp_path / "made", campaign())
-    node = start.node("fjr_bringup.replay_simulator", bag=bag)
+    node = start.node("fjr_bringup.replay.simulator", bag=bag)
     other = Experiment.from_json(read_text(bag), "bag").model_copy(update={"periods": 7})
     publisher = peer.node.create_publisher(String, "experiment", ros.EXPERIMENT_QOS)
     publisher.publish(String(data=other.to_json()))

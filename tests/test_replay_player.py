@@ -217,7 +217,7 @@ def test_what_cannot_be_published_is_refused(start, tmp_path, monkeypatch):
 
 
 def test_time_is_that_of_the_signal_that_keeps_it_or_of_the_recording(tmp_path):
-    from fjr_bringup.replay_messages import Messages
+    from fjr_bringup.replay.messages import Messages
 
     streams = rig_streams({"r": [1, 2, 3], "y": [2, 3], "u": [2, 3]})
     ahead = {"/rig/reference": [(t - 5 * MS + 10 * MS, d) for t, d in streams["/rig/reference"]]}
@@ -247,7 +247,7 @@ def test_time_is_that_of_the_signal_that_keeps_it_or_of_the_recording(tmp_path):
 def test_recorded_offers_become_publishers_as_in_rosbag2():
     from rclpy.qos import DurabilityPolicy, HistoryPolicy, ReliabilityPolicy
 
-    from fjr_bringup.replay_messages import to_offer
+    from fjr_bringup.replay.messages import to_offer
     from fjr_interface.bag_writer import EXPERIMENT_QOS, SIGNAL_QOS
 
     latched = to_offer([EXPERIMENT_QOS])

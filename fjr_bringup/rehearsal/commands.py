@@ -10,8 +10,8 @@ from typing import Annotated
 
 import typer
 
-from .guard import INTERRUPTED, guarded
-from .run_commands import Rig, Set
+from ..guard import INTERRUPTED, guarded
+from ..run_commands import Rig, Set
 
 NO_GO = 3
 """Exit status of a rehearsal that ends in NO-GO."""
@@ -84,12 +84,12 @@ def rehearse(
 
     Exit status: 0 GO, 3 NO-GO, 130 Ctrl-C, 2 bad input, 1 an error of fjr.
     """
-    from .execute import parse_settings
-    from .rehearsal_progress import RehearsalProgress
+    from ..execute import parse_settings
+    from .progress import RehearsalProgress
 
     try:
+        from .options import Options
         from .rehearse import rehearse as run
-        from .rehearse_options import Options
     except ImportError as error:
         from fjr_interface.errors import InputError
 

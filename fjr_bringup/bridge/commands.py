@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from .guard import guarded
+from ..guard import guarded
 
 
 class Direction(str, Enum):

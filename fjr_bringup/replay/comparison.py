@@ -19,7 +19,7 @@ from fjr_interface.bag_reader import BagReader
 from fjr_interface.errors import InputError
 from fjr_interface.topics import MOTOR_POSITION, MOTOR_TORQUE, REFERENCE
 
-from .replay_plan import PLAYED_ANEW, ReplayPlan
+from .plan import PLAYED_ANEW, ReplayPlan
 
 SCHEMA = "fjr_rig/replay/1"
 REPLAY_FILE = "replay.json"

@@ -12,8 +12,8 @@ from bla_analyzer.result import Check
 from fjr_interface.parameter_file import load_parameter_file
 from fjr_interface.parameters import Parameter, ParameterGroup
 
-from .rehearsal_prediction import Prediction
-from .rehearsal_timing import LoopTiming, TopicTiming
+from .prediction import Prediction
+from .timing import LoopTiming, TopicTiming
 
 LIMITS = ParameterGroup(
     Parameter("rate_error", 1e-3, "", "Relative error of the rate of positions", 0.0, 1.0),

@@ -1,6 +1,6 @@
-"""Tables of limits and faults for the document: `python -m fjr_bringup.rehearsal_tables`.
+"""Tables of limits and faults for the document: `python -m fjr_bringup.rehearsal.tables`.
 
-`python -m fjr_bringup.rehearsal_tables docs/rehearsal.md` puts them between the document's marks.
+`python -m fjr_bringup.rehearsal.tables docs/rehearsal.md` puts them between the document's marks.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from pathlib import Path
 from fjr_interface.parameters import Parameter
 from fjr_sim_node.faults import CATALOGUE, Fault
 
-from .rehearsal_limits import LIMITS
+from .limits import LIMITS
 
 
 def limits_table() -> str:

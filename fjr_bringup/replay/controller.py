@@ -1,6 +1,6 @@
 """Stands in for the controller: answers each position with the recorded torque of its stamp.
 
-`python -m fjr_bringup.replay_controller --ros-args -p bag:=FOLDER`
+`python -m fjr_bringup.replay.controller --ros-args -p bag:=FOLDER`
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from fjr_interface.errors import InputError
 from fjr_interface.joint_state import JointStateReader, JointStateWriter, LayoutError
 from fjr_interface.parameters import ParameterGroup
 
-from .replay_bag import BAG_PARAMETER, read_recorded
+from .bag import BAG_PARAMETER, read_recorded
 
 PARAMETERS = ParameterGroup(BAG_PARAMETER, ros.JOINT_PARAMETER, ros.readers_parameter("simulator"))
 

@@ -19,8 +19,8 @@ from fjr_interface.errors import InputError
 from fjr_interface.experiment import Experiment
 from fjr_interface.joint_state import JointStateReader, LayoutError
 
-from .recorder import Recorder
-from .rehearsal_timing import RECORD
+from ..recorder import Recorder
+from .timing import RECORD
 
 ARRIVALS = "arrivals.npz"
 """File with all messages of a rehearsal: `reference`, `position`, `torque`, of dtype RECORD."""

@@ -17,20 +17,20 @@ from rich.console import Console
 from fjr_interface.errors import InputError
 from fjr_interface.parameter_file import save_parameter_file
 
-from .conductor import Conductor
-from .domain import claimed_domain, reach
-from .graph_run import ROLES, start_nodes
-from .interruption import Interruption
-from .processes import NODES, ProcessGroup
-from .progress import CampaignProgress
-from .replay_comparison import compare, print_table, report, write_report
-from .replay_plan import CONTROLLER, LOOP, PLANT, ReplayPlan
+from ..conductor import Conductor
+from ..domain import claimed_domain, reach
+from ..graph_run import ROLES, start_nodes
+from ..interruption import Interruption
+from ..processes import NODES, ProcessGroup
+from ..progress import CampaignProgress
+from .comparison import compare, print_table, report, write_report
+from .plan import CONTROLLER, LOOP, PLANT, ReplayPlan
 
-_EXCITATION = {"excitation": "fjr_bringup.replay_excitation"}
+_EXCITATION = {"excitation": "fjr_bringup.replay.excitation"}
 STAND_INS: Mapping[str, Mapping[str, str]] = {
     LOOP: _EXCITATION,
-    PLANT: {**_EXCITATION, "controller": "fjr_bringup.replay_controller"},
-    CONTROLLER: {**_EXCITATION, "simulator": "fjr_bringup.replay_simulator"},
+    PLANT: {**_EXCITATION, "controller": "fjr_bringup.replay.controller"},
+    CONTROLLER: {**_EXCITATION, "simulator": "fjr_bringup.replay.simulator"},
 }
 """Node name and the module that stands in for it, by what the bag is replayed into."""
 

@@ -11,9 +11,9 @@ import numpy as np
 from bla_analyzer.page import Cell, bullets, figure, page, table
 from bla_analyzer.plot_parts import Plot, extremes, frequency_layout, hover, stack, trace
 
-from .rehearsal_prediction import Prediction
-from .rehearsal_result import Rehearsal, milliseconds
-from .rehearsal_timing import EDGES_S, LoopTiming
+from .prediction import Prediction
+from .result import Rehearsal, milliseconds
+from .timing import EDGES_S, LoopTiming
 
 _KINDS = (
     ("delay", "delay", "--excited"),

@@ -19,20 +19,20 @@ from fjr_interface.experiment import Experiment
 from fjr_sim_node.faults import NODE, FaultPlan
 from fjr_sim_node.simulator import run_realization
 
-from .campaign import CAMPAIGN_FILE, bag_folder
-from .domain import claimed_domain, reach
-from .graph_run import ros_arguments, save_roles
-from .interruption import Interruption
-from .processes import NODES, ProcessGroup
-from .rehearsal_conductor import Killing, Played, RehearsalConductor
-from .rehearsal_limits import judge
-from .rehearsal_prediction import predict
-from .rehearsal_progress import RehearsalProgress
-from .rehearsal_report import render
-from .rehearsal_result import Rehearsal, to_json
-from .rehearsal_safety import onset_ns, safe_state
-from .rehearsal_timing import loop_timing
-from .rehearse_options import EXTERNAL, SIMULATED, Options, Plan, check_options
+from ..campaign import CAMPAIGN_FILE, bag_folder
+from ..domain import claimed_domain, reach
+from ..graph_run import ros_arguments, save_roles
+from ..interruption import Interruption
+from ..processes import NODES, ProcessGroup
+from .conductor import Killing, Played, RehearsalConductor
+from .limits import judge
+from .options import EXTERNAL, SIMULATED, Options, Plan, check_options
+from .prediction import predict
+from .progress import RehearsalProgress
+from .report import render
+from .result import Rehearsal, to_json
+from .safety import onset_ns, safe_state
+from .timing import loop_timing
 
 REPORT, RESULT = "report.html", "rehearsal.json"
 

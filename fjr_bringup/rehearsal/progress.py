@@ -8,7 +8,7 @@ from types import TracebackType
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 
-from .rehearsal_timing import LoopTiming
+from .timing import LoopTiming
 
 _LINE_EVERY_S = 10.0
 

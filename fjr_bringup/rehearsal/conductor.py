@@ -19,12 +19,12 @@ from fjr_interface.experiment import Experiment
 from fjr_interface.topics import MOTOR_POSITION, MOTOR_TORQUE
 from fjr_sim_node.faults import NO_FAULT, NODE, FaultPlan, as_text
 
-from .conductor import Conductor
-from .interruption import Interruption
-from .processes import ProcessGroup
-from .rehearsal_progress import RehearsalProgress
-from .rehearsal_recorder import RehearsalRecorder
-from .rehearsal_timing import loop_timing
+from ..conductor import Conductor
+from ..interruption import Interruption
+from ..processes import ProcessGroup
+from .progress import RehearsalProgress
+from .recorder import RehearsalRecorder
+from .timing import loop_timing
 
 _POLL_S = 0.01
 _SHOW_S = 1.0

@@ -1,6 +1,6 @@
 """Stands in for the excitation: streams a bag's reference and publishes its description.
 
-`python -m fjr_bringup.replay_excitation --ros-args -p bag:=FOLDER`
+`python -m fjr_bringup.replay.excitation --ros-args -p bag:=FOLDER`
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from fjr_interface import ros
 from fjr_interface.experiment import Experiment
 from fjr_interface.parameters import ParameterGroup
 
-from .replay_bag import BAG_PARAMETER, Recorded, read_recorded
+from .bag import BAG_PARAMETER, Recorded, read_recorded
 
 PARAMETERS = ParameterGroup(BAG_PARAMETER, *STREAM)
 

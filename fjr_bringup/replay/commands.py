@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from .guard import guarded
+from ..guard import guarded
 
 _PUBLISH, _INTO = "Publishing", "Into the graph"
 

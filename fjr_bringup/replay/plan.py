@@ -15,9 +15,9 @@ from fjr_interface.parameter_file import load_parameter_file
 from fjr_interface.parameters import Value
 from fjr_sim_node.simulator import SIMULATOR, encoder_noise
 
-from .campaign import CAMPAIGN_FILE
-from .execute import parse_settings
-from .replay_bag import read_description, the_bag
+from ..campaign import CAMPAIGN_FILE
+from ..execute import parse_settings
+from .bag import read_description, the_bag
 
 LOOP, PLANT, CONTROLLER = "closed-loop", "plant", "controller"
 

@@ -18,9 +18,9 @@ from fjr_interface.experiment import Experiment
 from fjr_interface.real_time import REAL_TIME
 from fjr_sim_node.faults import NODE, FaultPlan, as_text
 
-from .campaign import GROUPS, Campaign
-from .processes import NODES
-from .rehearsal_limits import LimitsFile
+from ..campaign import GROUPS, Campaign
+from ..processes import NODES
+from .limits import LimitsFile
 
 SIMULATED, EXTERNAL = "simulated", "external"
 

@@ -11,7 +11,7 @@ import typer
 
 from fjr_interface.errors import InputError
 
-from .replay_bag import the_bag
+from .bag import the_bag
 
 MAX = "max"
 """Names the rate that only the readers limit."""
@@ -100,11 +100,11 @@ def replay_bag(bag: Path, graph: IntoGraph, publishing: Publishing) -> None:
             "--rate, --topic, --start-offset, --loop and --wait-for are for publishing; --into "
             "plays the whole bag in lockstep."
         )
-    from .replay_plan import plan_replay
+    from .plan import plan_replay
 
     plan = plan_replay(bag, graph.into, graph.rig, graph.settings)
     try:
-        from .replay_graph import replay_into
+        from .graph import replay_into
     except ImportError as error:
         raise _no_ros(error) from None
     typer.echo(replay_into(plan, graph.out))
@@ -112,7 +112,7 @@ def replay_bag(bag: Path, graph: IntoGraph, publishing: Publishing) -> None:
 
 def _publish(bag: Path, publishing: Publishing) -> None:
     try:
-        from .replay_player import publish_bag
+        from .player import publish_bag
     except ImportError as error:
         raise _no_ros(error) from None
     publish_bag(the_bag(bag), publishing)

@@ -1,6 +1,6 @@
 """Stands in for the drive: publishes the recorded positions, in lockstep with the torques.
 
-`python -m fjr_bringup.replay_simulator --ros-args -p bag:=FOLDER`
+`python -m fjr_bringup.replay.simulator --ros-args -p bag:=FOLDER`
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from fjr_interface.experiment import Experiment
 from fjr_interface.joint_state import JointStateReader, JointStateWriter, LayoutError
 from fjr_interface.parameters import ParameterGroup
 
-from .replay_bag import BAG_PARAMETER, clock_message, read_recorded
+from .bag import BAG_PARAMETER, clock_message, read_recorded
 
 PARAMETERS = ParameterGroup(BAG_PARAMETER, ros.JOINT_PARAMETER, ros.readers_parameter("controller"))
 

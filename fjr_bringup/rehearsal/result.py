@@ -13,9 +13,9 @@ import numpy as np
 from bla_analyzer.result import Check
 from bla_analyzer.result_json import pretty
 
-from .rehearsal_limits import go
-from .rehearsal_prediction import Prediction
-from .rehearsal_timing import EDGES_S, Distribution, LoopTiming
+from .limits import go
+from .prediction import Prediction
+from .timing import EDGES_S, Distribution, LoopTiming
 
 SCHEMA = "fjr_rig/rehearsal/1"
 

@@ -19,13 +19,13 @@ from fjr_interface import ros
 from fjr_interface.errors import InputError
 from fjr_interface.topics import NAMESPACE
 
-from .domain import own_domain, reach
-from .interruption import Interruption
-from .progress import CampaignProgress
+from ..domain import own_domain, reach
+from ..interruption import Interruption
+from ..progress import CampaignProgress
+from .bag import clock_message
+from .messages import CLOCK, Messages, PlayedTopic
 from .replay import Publishing
-from .replay_bag import clock_message
-from .replay_messages import CLOCK, Messages, PlayedTopic
-from .replay_summary import PlayedLine, print_summary
+from .summary import PlayedLine, print_summary
 
 NODE = "replay"
 

@@ -17,7 +17,7 @@ from fjr_interface.errors import InputError
 from fjr_interface.joint_state import JointStateReader, JointStateWriter, LayoutError
 from fjr_interface.parameters import Parameter, ParameterGroup
 
-from .bridge_mapping import Answers, CommandReader, Observer, Sample
+from .mapping import Answers, CommandReader, Observer, Sample
 
 _TOPICS = (
     Parameter("joint_states_topic", "/robot_joint_states", "", "Topic of the joint states"),
@@ -259,7 +259,3 @@ def main() -> int:
         print("error: say serve or observe before --ros-args.", file=sys.stderr)
         return 2
     return ros.run(BRIDGES[direction])
-
-
-if __name__ == "__main__":
-    sys.exit(main())
