@@ -14,8 +14,9 @@ from hypothesis import strategies as st
 from controller_node import pd_filtered
 from fjr_bringup.replay.bag import the_bag
 from fjr_bringup.replay.comparison import Difference, compare, report, write_report
+from fjr_bringup.replay.options import IntoGraph, Publishing
 from fjr_bringup.replay.plan import plan_replay
-from fjr_bringup.replay.replay import IntoGraph, Publishing, replay_bag
+from fjr_bringup.replay.replay import replay_bag
 from fjr_interface.errors import InputError
 
 PD = pd_filtered.describe(pd_filtered.CONTROLLER.defaults())

@@ -105,7 +105,8 @@ def replay(
     ] = None,
 ) -> None:
     """Publish a bag with its clock, or play it into controller and simulated plant."""
-    from .replay import IntoGraph, Publishing, replay_bag
+    from .options import IntoGraph, Publishing
+    from .replay import replay_bag
 
     graph = IntoGraph(into.value if into else None, rig, tuple(settings or ()), out)
     replay_bag(bag, graph, Publishing.of(rate, topics, start_offset_s, loop, wait_for))

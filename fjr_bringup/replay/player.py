@@ -24,7 +24,7 @@ from ..interruption import Interruption
 from ..progress import CampaignProgress
 from .bag import clock_message
 from .messages import CLOCK, Messages, PlayedTopic
-from .replay import Publishing
+from .options import Publishing
 from .summary import PlayedLine, print_summary
 
 NODE = "replay"
