@@ -58,6 +58,14 @@ def test_a_dead_excitation_is_missed_when_its_references_end():
     assert not check(text, torques(3.0, 2.6), killed, ahead_s=1.0).passed
 
 
+def test_a_loop_whose_last_position_is_lost_goes_on_until_then():
+    u = torques(3.0)[:-1]
+    watchdog = u[-1:].copy()
+    watchdog["value"] = 0.0
+    watchdog["received"] += 103_000_000
+    assert check("loss", np.concatenate([u, watchdog])).passed
+
+
 def test_a_loop_that_goes_on_must_not_pause_nor_exceed_its_limits():
     assert check("loss", torques(3.0)).passed
     assert not check("loss", torques(2.5)).passed

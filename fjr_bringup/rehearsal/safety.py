@@ -61,7 +61,10 @@ def safe_state(
             words = f"{what} {bad} torques were not finite or beyond {torque_limit_nm:g} N m"
             return _check(math.inf, limit_s, words)
         asked = min(ended_ns, int(position["sent"][-1]))
-        times = np.concatenate([[began_ns], after["received"], [max(asked, began_ns)]])
+        # Behind the last position nobody asks any more: if that one was lost, the watchdog's
+        # torques come then, and end no pause.
+        answers = after["received"][after["received"] <= asked]
+        times = np.concatenate([[began_ns], answers, [max(asked, began_ns)]])
         pause_s = float(np.diff(times).max()) * 1e-9
         words = f"{what} no torque came for {pause_s:.3f} s at most ({SAFE_STATES[CONTINUES]})"
         return _check(pause_s, limit_s, words)
