@@ -7,7 +7,8 @@ with a fault, each in its turn: without a fault nothing may be lost, with one th
 reached. In lockstep, a campaign of so many realizations is recorded while its nodes and `fjr run`
 itself are killed at random; it is started again each time, and at its end every bag must have the
 bytes of the batch simulation. The memory of each process is sampled; what grows steadily shows as
-the growth from the second quarter of its samples to the last.
+the growth from the second quarter of its samples to the last, in processes that lived long enough
+to have been started for most of that time.
 """
 
 from __future__ import annotations
@@ -37,7 +38,6 @@ from fjr_sim_node.faults import CATALOGUE
 
 MARK = f"FJR_SOAK={uuid.uuid4().hex}"
 MOST_GROWTH_MB = 8.0
-FEWEST_SAMPLES = 12
 SEED = 1
 _MOST_FAILURES = 20
 RUN = (
@@ -49,8 +49,9 @@ RUN = (
 class Memory:
     """Resident memory of processes, sampled by name and process number."""
 
-    def __init__(self) -> None:
-        """Start without samples."""
+    def __init__(self, fewest: int) -> None:
+        """Start without samples; processes with fewer than `fewest` tell nothing."""
+        self._fewest = fewest
         self.samples: dict[tuple[str, int], list[float]] = {}
 
     def sample(self, pids: dict[str, int]) -> None:
@@ -62,7 +63,7 @@ class Memory:
     def rows(self) -> Iterator[tuple[str, int, float, float, float]]:
         """Yield (name, samples, first, greatest, growth in MB) of processes that lived long."""
         for (name, _), sizes in self.samples.items():
-            if len(sizes) >= FEWEST_SAMPLES:
+            if len(sizes) >= self._fewest:
                 quarters = np.array_split(np.array(sizes), 4)
                 growth = float(np.median(quarters[3]) - np.median(quarters[1]))
                 yield name, len(sizes), sizes[0], max(sizes), growth
@@ -110,7 +111,7 @@ def orphans() -> int:
 
 def real_time(minutes: float) -> bool:
     """Rehearse again and again; print what came of it; return whether all is well."""
-    memory, until = Memory(), time.monotonic() + 60.0 * minutes
+    memory, until = Memory(fewest=12), time.monotonic() + 60.0 * minutes
     plays = lost = samples = faults = safe = 0
     folder = Path(tempfile.mkdtemp())
     plan = plan_in(folder / "soak")
@@ -143,7 +144,7 @@ def real_time(minutes: float) -> bool:
 
 def lockstep(realizations: int) -> bool:
     """Record a campaign that is sabotaged; print what came of it; return whether all is well."""
-    memory, chance = Memory(), random.Random(SEED)
+    memory, chance = Memory(fewest=60), random.Random(SEED)
     folder = Path(tempfile.mkdtemp())
     command = [sys.executable, "-m", "fjr_bringup", "run", "--out", str(folder / "graph"), *RUN]
     command += ["--realizations", str(realizations)]
