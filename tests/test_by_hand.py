@@ -79,7 +79,9 @@ def test_an_emergency_stop_holds_zero_torque_until_it_is_released(start, rig):  
     nodes["s"](), nodes["e"]()
     controller = nodes["c"]()
     rig.peer.spin_until(lambda: len(rig.torque) > 100, "torques")
-    assert "zero torque until released" in fjr(start, "estop")
+    # Asked while listening: a subscription keeps the latest 2000 torques only, half a second.
+    stopped = rig.peer.call(Trigger, "controller/estop", Trigger.Request())
+    assert "zero torque until released" in stopped.message
     rig.peer.spin_until(lambda: rig.torque[-1].effort[0] == 0.0, "zero torque")
     torque = np.array([message.effort[0] for message in rig.torque])
     (ramp,) = np.flatnonzero(np.diff(np.sign(np.abs(torque[100:])) == 0.0, prepend=False))[:1]
