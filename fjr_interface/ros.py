@@ -15,10 +15,6 @@ from typing import Any
 # not move hardware on the network. rclpy reads this when it starts.
 os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
 
-# Through shared memory, a process that was killed held the writers that it read from up for 2 s,
-# and what it left behind could keep a new node from being found. Sockets forget the dead at once.
-os.environ.setdefault("FASTDDS_BUILTIN_TRANSPORTS", "UDPv4")
-
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import SetParametersResult

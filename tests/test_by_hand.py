@@ -56,9 +56,12 @@ def test_pause_step_speed_reset_stop_and_play_by_the_command(start, rig):  # noq
     assert stamps(rig.torque)[-7:] == list(range(first, first + 7))
     assert fjr(start, "speed", "2").endswith("; 2 x real time")
     assert ask("reset").success
+    rig.torque.clear()
     assert ask("play").message.startswith("playing: ")
     assert not ask("step").success
-    rig.peer.spin_until(lambda: stamps(rig.torque)[-1] < 1000, "the run from its beginning")
+    rig.peer.spin_until(
+        lambda: rig.torque and stamps(rig.torque)[0] == 1, "the run from its beginning"
+    )
     assert ask("stop").success
     assert ask("status").message.startswith("stopped: no realization under way")
     assert "speed out of range" in fjr(start, "speed", "0", status=2)
@@ -124,7 +127,9 @@ def test_in_real_time_every_sample_is_played_and_the_drive_says_how_late(start, 
     position = rig.peer.listen(rig.kind, "motor_position", rig.qos)
     nodes = in_real_time(start, periods=1)
     simulator = start.node("fjr_sim_node", **REAL_TIME, readers="controller,peer")
-    nodes["c"](), nodes["e"]()
+    nodes["c"]()
+    rig.peer.spin_until(lambda: rig.peer.node.count_publishers("motor_torque"), "the controller")
+    nodes["e"]()
     experiment = described(sample_rate_hz=200.0, periods=1)
     last = int(experiment.stamps_ns[-1])
     rig.peer.spin_until(lambda: position and stamp_ns(position[-1]) == last, "the last position")
