@@ -227,8 +227,11 @@ CATALOGUE: tuple[Effect, ...] = (
         "torque_saturation",
         "The drive clips the torque.",
         "highest amplitude only",
-        "drive limit",
-        (Parameter("limit_nm", math.inf, "N m", "Greatest torque; .inf: no limit", 1e-6),),
+        "drive limit; the knee as a motor's iron saturates",
+        (
+            Parameter("limit_nm", math.inf, "N m", "Greatest torque; .inf: no limit", 1e-6),
+            Parameter("knee", 0.0, "", "Share of the limit over which it bends", 0.0, 1.0),
+        ),
     ),
     Effect(
         "torque_gain",
@@ -302,7 +305,7 @@ DEFAULTS: tuple[float, ...] = tuple(float(parameter.default) for parameter in PA
     COGGING, COGGING_CYCLES, COGGING_PHASE, COGGING_SECOND, COGGING_SECOND_PHASE,
     DELAY,
     LAG,
-    SATURATION,
+    SATURATION, SATURATION_KNEE,
     GAIN_ERROR,
     RESOLUTION,
     ECCENTRICITY, ECCENTRICITY_PHASE,

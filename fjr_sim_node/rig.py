@@ -63,6 +63,22 @@ def _scaled_friction(p, factor):
 
 
 @jit
+def limited(command, limit, knee):
+    """Return what the drive gives of a command (N m).
+
+    The torque bends into the limit by a parabola from (1 - knee) to (1 + knee) times the limit; a
+    knee of 0 clips.
+    """
+    if knee == 0.0 or limit == math.inf:
+        return min(max(command, -limit), limit)
+    beyond = abs(command) - (1.0 - knee) * limit
+    if beyond <= 0.0:
+        return command
+    bent = abs(command) - beyond * beyond / (4.0 * knee * limit)
+    return math.copysign(bent if beyond < 2.0 * knee * limit else limit, command)
+
+
+@jit
 def hold(x, command, sample_period, p, e):
     """Advance the rig in place by one sample period under a held torque command.
 
@@ -76,8 +92,7 @@ def hold(x, command, sample_period, p, e):
     if e is None:
         x[0], x[1], x[2], x[3] = advance(x[0], x[1], x[2], x[3], command, sample_period, p)
         return
-    limit = e[fx.SATURATION]
-    torque = min(max(command, -limit), limit) * (1.0 + e[fx.GAIN_ERROR])
+    torque = limited(command, e[fx.SATURATION], e[fx.SATURATION_KNEE]) * (1.0 + e[fx.GAIN_ERROR])
     if e[fx.DRIFT] != 0.0:
         p = _scaled_friction(p, max(1.0 + e[fx.DRIFT] * x[_TIME], 0.0))
     x[_TIME] += sample_period

@@ -9,11 +9,12 @@ never exactly of the model's family. They were set by hand on the training cases
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from .fits import Fit, Fitter
-from .ripples import RIPPLES
+from .shape_scan import RIPPLES
 
 CERTAIN = 60.0
 """Least fall of the held-out chi-square that an effect must bring, whatever its share."""
@@ -36,7 +37,7 @@ TIE = 0.5
 the best leaves beyond noise: so much the model's own form may be wrong."""
 
 NEAR_EQUIVALENTS: tuple[frozenset[str], ...] = (
-    frozenset({"torque_bias", "asymmetric_friction", "gravity"}),
+    frozenset({"torque_bias", "asymmetric_friction", "gravity", "cogging"}),
     frozenset({"backlash", "piecewise_stiffness"}),
     frozenset({"delay", "actuator_lag"}),
     frozenset({"transmission_damping", "hysteresis"}),
@@ -53,6 +54,7 @@ _WORTH_A_HARMONIC = 1.3
 _SECOND_PROMISE = 1.2  # a second effect that has not gained that much after a few steps is dropped
 _PROMISING_SECONDS = 5
 _PROMISING_PARTNERS = 2
+_SWAPPED = 3  # effects to put in the place of a member of the best pair
 _SCREENED = 2  # times as many are tried at several sizes as are fitted
 
 Progress = Callable[[str], None]
@@ -123,6 +125,7 @@ class Search:
         refit = self._fitter.refit()
         self._extend(refit, self._fitter.catalogue)
         best = refit
+        self._polish(1)
         self._enrich(1)
         single = self._ranked(1)
         if single and self._calls_for(refit, single[0], SMALL_GAIN):
@@ -131,26 +134,37 @@ class Search:
             refit, self._all_ranked(), best, self._tied(best), self._explains(refit, best)
         )
 
-    def _extend(self, parent: Fit, effects: Sequence[str], most: int | None = None) -> None:
+    def _extend(
+        self,
+        parent: Fit,
+        effects: Sequence[str],
+        most: int | None = None,
+        like: Sequence[str] = (),
+    ) -> None:
         """Fit the parent with each effect more, in the order of what their starts achieve.
 
         Args:
             parent: the explanation to extend.
             effects: identifiers to add, one at a time.
             most: how many of them to pursue; None for all.
+            like: effects whose near equivalents are pursued besides.
         """
-        least = parent.train_chi2
+        rivals = [fit.train_chi2 for fit in self._ranked(len(parent.effects) + 1)]
+        least = min(parent.train_chi2, *rivals) if rivals else parent.train_chi2
         screened = {effect: self._fitter.screening(parent, effect) for effect in effects}
         hopeful = sorted(effects, key=lambda effect: -screened[effect].gain)
         if most is not None:
             hopeful = hopeful[: _SCREENED * most]
         proposals = {effect: screened[effect].proposals() for effect in hopeful}
         ordered = sorted(hopeful, key=lambda effect: proposals[effect][0][0])[:most]
-        for partner in _partners(ordered[:_PROMISING_PARTNERS], set(effects) - set(ordered)):
+        promising = [*ordered[:_PROMISING_PARTNERS], *like]
+        for partner in _partners(promising, set(effects) - set(ordered)):
             proposals.setdefault(partner, screened[partner].proposals())
             ordered.append(partner)
         for number, effect in enumerate(ordered, 1):
             name = " + ".join((*parent.effects, effect))
+            if self._settled(tuple(sorted((*parent.effects, effect)))):
+                continue
             self._progress(f"{name} ({number} of {len(ordered)})")
             limit = _GIVE_UP * max(least, self._fitter.train.size)
             if most is not None:
@@ -180,9 +194,13 @@ class Search:
         return tuple(ordered)
 
     def _calls_for(self, simple: Fit, rich: Fit, gain: float) -> bool:
-        """Whether the richer explanation is worth its effect: a gain on held-out data."""
+        """Whether the richer explanation is worth its effect: a gain on held-out data.
+
+        What gains on held-out data alone has only happened to extrapolate better.
+        """
         before, after = self.misfit(simple), self.misfit(rich)
-        return before - after > CERTAIN / self._fitter.held.size and before > gain * after
+        certain = before - after > CERTAIN / self._fitter.held.size
+        return certain and min(before / after, simple.train_chi2 / rich.train_chi2) > gain
 
     def _explains(self, refit: Fit, best: Fit) -> bool:
         left = max(self.misfit(best), _NOTHING)
@@ -200,25 +218,43 @@ class Search:
             if self.misfit(parent) < _NEAR * self.misfit(best):
                 others = [e for e in self._fitter.catalogue if e not in parent.effects]
                 self._extend(parent, others, _PROMISING_SECONDS)
-        self._swap()
+        self._swap(best)
+        self._polish(2)
         self._enrich(2)
         pairs = self._ranked(2)
         return 2 if pairs and self._calls_for(best, pairs[0], SECOND_GAIN) else 1
 
-    def _swap(self) -> None:
-        """Fit the best pair with each member replaced by its near equivalents."""
+    def _swap(self, best: Fit) -> None:
+        """Fit the best pair with each member replaced: by what promises most, and by its like.
+
+        A pair that leaves nothing is compared with its near equivalents alone.
+        """
         pairs = self._ranked(2)
-        if not pairs:
+        if not pairs or not self._calls_for(best, pairs[0], SECOND_GAIN):
             return
         for kept, swapped in (pairs[0].effects, pairs[0].effects[::-1]):
-            parent = self._fitter.without(pairs[0], swapped)
-            for partner in _partners([swapped], set(self._fitter.catalogue) - {kept, swapped}):
-                key = tuple(sorted((kept, partner)))
-                if key not in self._fits or not self._fits[key].converged:
-                    self._progress(f"{kept} + {partner}")
-                    starts = self._fitter.screening(parent, partner).proposals()
-                    limit = _GIVE_UP * max(pairs[0].train_chi2, self._fitter.train.size)
-                    self._fits[key] = self._fitter.add(parent, partner, starts, limit)
+            others = set(self._fitter.catalogue) - {kept, swapped}
+            if self.misfit(pairs[0]) < NOTHING_LEFT:
+                others &= set(_partners([swapped], others))
+            if others:
+                parent = self._fitter.without(pairs[0], swapped)
+                self._extend(parent, sorted(others), _SWAPPED, [swapped])
+
+    def _settled(self, effects: tuple[str, ...]) -> bool:
+        """Whether a fit of these effects has converged and another start could not help."""
+        fit = self._fits.get(effects)
+        if fit is None or not fit.converged:
+            return False
+        best = min(f.train_chi2 for f in self._ranked(len(effects)))
+        return fit.train_chi2 < _NEAR * best
+
+    def _polish(self, count: int) -> None:
+        """Take fits further that have not converged but would lead."""
+        best = min((f.train_chi2 for f in self._ranked(count)), default=math.inf)
+        for effects, fit in list(self._fits.items()):
+            if len(effects) == count and not fit.converged and fit.train_chi2 < best:
+                self._progress(f"{' + '.join(effects)}, further")
+                self._fits[effects] = self._fitter.continued(fit)
 
     def _tied(self, best: Fit) -> tuple[Fit, ...]:
         """Return the converged explanations of as many effects that do as well as the best."""

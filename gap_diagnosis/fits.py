@@ -14,18 +14,23 @@ from .least_squares import Solution, solve
 from .misfit import Misfit
 from .model import LINK_EFFECTS, Model, Simulator
 from .records import RecordedExperiment
-from .ripples import RIPPLES, best_cycles
 from .screening import Proposal, Screening
 from .search_space import STARTS, TOLERANCE, Space, space_for, starts
+from .shape_scan import RIPPLES, SCANNED, best_harmonics, best_shapes
 
 _KEPT_STARTS = 2
 _MOST_STEPS = 40
+_MORE_STEPS = 160  # along a valley in which sizes and parameters nearly replace each other
 _NESTED_STEPS = 3
 _FIRST_STEPS = 6
-_RIPPLES_TRIED = 4
+_SHAPES_TRIED = 4
 _WORTH_A_HARMONIC = 0.9
 _RIVAL = 1.5  # a second start that stays this far above the first is not pursued
 _NO_PROMISE = 0.998  # of the parent's chi-square: a start that gains less is not pursued far
+
+
+_Start = tuple[Space, np.ndarray, np.ndarray | None]
+"""A space, a point in it, and what is known of the Jacobian there."""
 
 
 @dataclass(frozen=True)
@@ -158,16 +163,16 @@ class Fitter:
 
     def screening(self, parent: Fit, effect: str) -> Screening:
         """Return what the starts of an effect promise beside a fit."""
-        cycles = None
-        if effect in RIPPLES and self._recorded.repeatable:
-            cycles = best_cycles(
+        shapes = {}
+        if effect in SCANNED and self._recorded.repeatable:
+            shapes[SCANNED[effect][0]] = best_shapes(
                 effect, self._recorded, self._simulator, self.train,
-                parent.model, parent.solution, _RIPPLES_TRIED,
+                parent.model, parent.solution, _SHAPES_TRIED,
             )  # fmt: skip
         return Screening(
             parent.solution,
             parent.model,
-            starts(effect, self.peak_torque_nm, cycles),
+            starts(effect, self.peak_torque_nm, shapes),
             partial(self._space, parent),
             self._errors,
         )
@@ -214,26 +219,65 @@ class Fitter:
             give_up_above = rival if limit is None else min(limit, rival)
         return min(fits, key=lambda fit: (not fit.converged, fit.train_chi2))
 
+    def continued(self, fit: Fit) -> Fit:
+        """Return a fit that has not converged, taken further from where it stands."""
+        return self._solve(
+            fit.effects, fit.space, fit.solution.x, most_steps=_MORE_STEPS,
+            known=fit.solution.jacobian,
+        )  # fmt: skip
+
     def with_second_harmonics(self, fit: Fit) -> Fit:
-        """Return a fit with a second harmonic of its ripples, or the fit itself if none helps."""
+        """Return a fit with a second harmonic of its ripples, or the fit itself if none helps.
+
+        One ripple fitted to two lies between them, so that both are looked for anew as well.
+        """
         for effect in fit.effects:
-            ratio, phase = f"{effect}.second_ratio", f"{effect}.second_phase_rad"
-            if effect not in RIPPLES or ratio in fit.space.effects:
+            if effect not in RIPPLES or f"{effect}.second_ratio" in fit.space.effects:
                 continue
-            found = Screening(
-                fit.solution,
-                fit.model,
-                [{ratio: 0.2, phase: angle} for angle in (0.0, 0.5 * np.pi)],
-                partial(self._space, fit),
-                self._errors,
-            ).proposals()
-            if not found or found[0][0] > _NO_PROMISE * fit.train_chi2:
-                continue
-            _, space, point = found[0]
-            richer = self._solve(fit.effects, space, point, known=fit.solution.jacobian)
-            if richer.converged and richer.train_chi2 < _WORTH_A_HARMONIC * fit.train_chi2:
-                fit = richer
+            for space, point, known in (
+                *self._second_harmonics(fit, effect),
+                *self._two_harmonics(fit, effect),
+            ):
+                richer = self._solve(fit.effects, space, point, known=known)
+                if richer.converged and richer.train_chi2 < _WORTH_A_HARMONIC * fit.train_chi2:
+                    fit = richer
+                    break
         return fit
+
+    def _second_harmonics(self, fit: Fit, effect: str) -> list[_Start]:
+        """Return where to start with a second harmonic of a ripple; nothing if none gains."""
+        ratio, phase = f"{effect}.second_ratio", f"{effect}.second_phase_rad"
+        found = Screening(
+            fit.solution,
+            fit.model,
+            [{ratio: 0.2, phase: angle} for angle in (0.0, 0.5 * np.pi)],
+            partial(self._space, fit),
+            self._errors,
+        ).proposals()
+        if not found or found[0][0] > _NO_PROMISE * fit.train_chi2:
+            return []
+        return [(found[0][1], found[0][2], fit.solution.jacobian)]
+
+    def _two_harmonics(self, fit: Fit, effect: str) -> list[_Start]:
+        """Return where to start with a ripple and its second harmonic in place of a ripple."""
+        if not self._recorded.repeatable:
+            return []
+        rest = self.without(fit, effect)
+        size, *shape = (name for name in fit.space.effects if name.startswith(f"{effect}."))
+        names = (size, *shape, f"{effect}.second_ratio", f"{effect}.second_phase_rad")
+        promising = best_harmonics(
+            effect, self._recorded, self._simulator, self.train,
+            rest.model, rest.solution, _SHAPES_TRIED,
+        )  # fmt: skip
+        found = []
+        for values in promising:
+            for share in (1.0, 0.4):
+                seed = dict(zip(names, (share * values[0], *values[1:]), strict=True))
+                space = self._space(rest, seed)
+                point = np.clip(space.point(rest.model.with_effects(seed)), *space.bounds())
+                found.append((space, point, None))
+        errors = self._errors([space.model(point) for space, point, _ in found])
+        return [found[int(np.argmin(np.einsum("ij,ij->i", errors, errors)))]]
 
     def without(self, fit: Fit, effect: str) -> Fit:
         """Return a fit with one of its effects off and all else as it was: not a minimum."""

@@ -122,13 +122,18 @@ def investigate(
 
 
 def _split(recorded: RecordedExperiment) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Return training and held-out realizations: in turn at each level; all, if a level has one."""
+    """Return training and held-out realizations: in turn at each level; all, if a level has one.
+
+    At each level the one with the greatest torque is for training, so that a limit that it reaches
+    is known to the fit before others are predicted.
+    """
     train, held = [], []
     for level in recorded.levels:
         members = [i for i, r in enumerate(recorded.realizations) if r.level == level]
+        members.sort(key=lambda i: -float(np.abs(recorded.realizations[i].torque).max()))
         train += members[0::2]
         held += members[1::2]
-    return (tuple(train), tuple(held)) if held else (tuple(train), tuple(train))
+    return tuple(sorted(train)), tuple(sorted(held or train))
 
 
 def _noise_std(recorded: RecordedExperiment, noise: NoiseLevels | None) -> np.ndarray:

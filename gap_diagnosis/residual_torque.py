@@ -20,6 +20,7 @@ import numpy as np
 from fjr_interface.compiled import jit
 from fjr_sim_node import effects as fx
 from fjr_sim_node.plant import advance, advance_with_effects
+from fjr_sim_node.rig import limited
 from fjr_sim_node.torques import (
     FS,
     FSM,
@@ -234,8 +235,8 @@ def _applied(
     hold = np.concatenate([[1.0], -np.expm1(-s_ts) / s_ts])
     if e is None:
         return lines * hold
-    limit = e[fx.SATURATION]
-    lines = np.fft.rfft(np.clip(torque, -limit, limit)) * (1.0 + e[fx.GAIN_ERROR])
+    given = [limited(u, e[fx.SATURATION], e[fx.SATURATION_KNEE]) for u in torque.tolist()]
+    lines = np.fft.rfft(given) * (1.0 + e[fx.GAIN_ERROR])
     return lines * hold * np.exp(-1j * omega * e[fx.DELAY]) / (1.0 + 1j * omega * e[fx.LAG])
 
 

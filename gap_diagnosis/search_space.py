@@ -18,7 +18,11 @@ TOLERANCE = 0.1
 is off scales all values."""
 
 _CYCLES = (1.0, 2.0, 4.0, 8.0, 16.0, 24.0, 36.0, 52.0, 72.0, 96.0, 120.0)
-"""Ripples per turn to try where the loop cannot be repeated; else `ripples` finds better ones."""
+"""Ripples per turn to try where the loop cannot be repeated; else `shape_scan` finds better."""
+
+_SHARES = (0.15, 0.25, 0.4, 0.5, 0.6, 0.7, 0.75, 0.8, 0.85, 0.9, 0.94, 0.97, 1.0, 1.04, 1.1)
+"""Torque limits over the greatest commanded torque: which peaks are clipped changes from one to
+the next, and a knee is felt below its limit."""
 
 STARTS: dict[str, tuple[dict[str, tuple[float, ...]], ...]] = {
     "stribeck_friction_motor": ({"torque_nm": (0.3, 2.0), "velocity_rad_s": (0.02, 0.1, 0.5)},),
@@ -57,7 +61,7 @@ STARTS: dict[str, tuple[dict[str, tuple[float, ...]], ...]] = {
     ),
     "extra_mode": (
         {
-            "inertia_kg_m2": (3e-3, 2e-2),
+            "inertia_kg_m2": (1e-3, 2e-2),
             "frequency_hz": (8.0, 15.0, 22.0, 30.0, 40.0, 55.0),
             "damping_ratio": (0.03,),
         },
@@ -72,7 +76,7 @@ STARTS: dict[str, tuple[dict[str, tuple[float, ...]], ...]] = {
     ),
     "delay": ({"time_s": (1e-4, 5e-4)},),
     "actuator_lag": ({"time_constant_s": (1e-4, 5e-4)},),
-    "torque_saturation": ({"limit_nm": (np.nan,)},),  # from the data: see `starts`
+    "torque_saturation": ({"limit_nm": _SHARES, "knee": (0.1,)},),  # of the peak: see `starts`
     "torque_gain": ({"relative_error": (0.05,)},),
     "encoder_quantization": ({"resolution_rad": (1e-4, 5e-4)},),
     "encoder_eccentricity": ({"amplitude_rad": (1e-3, 3e-2), "phase_rad": (0.0, np.pi / 2)},),
@@ -104,7 +108,7 @@ NEGLIGIBLE: dict[str, float] = {
 
 
 def starts(
-    effect: str, peak_torque_nm: float, cycles: Sequence[float] | None = None
+    effect: str, peak_torque_nm: float, shapes: Mapping[str, Sequence[float]] | None = None
 ) -> list[dict[str, float]]:
     """Return the starting points of an effect by full parameter name.
 
@@ -112,15 +116,13 @@ def starts(
         effect: identifier.
         peak_torque_nm: greatest torque of the record; a drive that saturates does so below it,
             and far below where the loop then asks for more.
-        cycles: ripples per turn of an angle-periodic effect; None for a coarse grid.
+        shapes: values of a shape parameter that promise more than the coarse grid, by its name.
     """
-    if effect == "torque_saturation":
-        shares = (0.15, 0.25, 0.4, 0.55, 0.7, 0.8, 0.9, 0.97)
-        return [{"torque_saturation.limit_nm": share * peak_torque_nm} for share in shares]
     points = []
     for grid in STARTS[effect]:
-        if cycles is not None and "cycles_per_turn" in grid:
-            grid = {**grid, "cycles_per_turn": tuple(cycles)}
+        if effect == "torque_saturation":
+            grid = {**grid, "limit_nm": tuple(s * peak_torque_nm for s in grid["limit_nm"])}
+        grid = {**grid, **{n: tuple(v) for n, v in (shapes or {}).items() if n in grid}}
         for values in itertools.product(*grid.values()):
             names = (f"{effect}.{name}" for name in grid)
             points.append(dict(zip(names, values, strict=True)))

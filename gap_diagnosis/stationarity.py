@@ -38,6 +38,8 @@ GROUPS: dict[str, tuple[str, ...]] = {
     "stiffness": ("k0", "k1"),
 }
 """Parameters of the bare plant that drift together."""
+SEEN = 2.0
+"""Standard deviations from which a level counts as one that shows a change."""
 STEP = 0.01
 """Relative step of the central difference."""
 
@@ -121,6 +123,8 @@ class BagDrift:
         z: significance of differences between the bags of a level, standard normal if there are
             none.
         slope_per_s: relative change per second of the record, along the order of bags in levels.
+        levels_agree: whether two levels (or the only one) show a change of the same sign; what a
+            wrong model leaves may differ in one.
     """
 
     group: str
@@ -128,6 +132,7 @@ class BagDrift:
     std: np.ndarray
     z: float
     slope_per_s: float
+    levels_agree: bool
 
 
 def bag_drift(
@@ -160,7 +165,8 @@ def bag_drift(
             deviation[:, i],
             spread[:, i],
             _difference_z(deviation[:, i], spread[:, i], levels),
-            _slope(deviation[:, i], spread[:, i], levels) / run_s,
+            _slope(deviation[:, i], spread[:, i], levels)[0] / run_s,
+            _agree(deviation[:, i], spread[:, i], levels),
         )
         for i, group in enumerate(groups)
     ]
@@ -208,8 +214,18 @@ def _difference_z(deviation: np.ndarray, std: np.ndarray, levels: np.ndarray) ->
     return float(stats.norm.isf(np.clip(stats.chi2.sf(q, degrees), 1e-300, 1.0 - 1e-15)))
 
 
-def _slope(deviation: np.ndarray, std: np.ndarray, levels: np.ndarray) -> float:
-    """Return the change per bag within levels."""
+def _slope(deviation: np.ndarray, std: np.ndarray, levels: np.ndarray) -> tuple[float, float]:
+    """Return the change per bag within levels, and its standard deviation."""
     order = _within(np.arange(levels.size), std, levels)
     weight = std**-2.0
-    return float(np.sum(weight * order * deviation) / np.sum(weight * order**2))
+    power = float(np.sum(weight * order**2))
+    return float(np.sum(weight * order * deviation)) / power, power**-0.5
+
+
+def _agree(deviation: np.ndarray, std: np.ndarray, levels: np.ndarray) -> bool:
+    """Tell whether two levels, or the only one that can, show a change of the same sign."""
+    members = [np.flatnonzero(levels == level) for level in np.unique(levels)]
+    members = [at for at in members if at.size > 1]
+    slopes = [_slope(deviation[at], std[at], levels[at]) for at in members]
+    seen = [slope > 0.0 for slope, spread in slopes if abs(slope) > SEEN * spread]
+    return max(seen.count(True), seen.count(False)) >= min(len(members), 2)

@@ -461,6 +461,17 @@ def test_saturation_clips_the_torque():
     assert np.abs(TORQUE).max() > 25.0
 
 
+def test_a_knee_bends_the_torque_smoothly_into_its_limit():
+    u = np.linspace(-60.0, 60.0, 24_001)
+    given = np.array([rig.limited(value, 30.0, 0.2) for value in u])
+    inside, outside = np.abs(u) <= 24.0, np.abs(u) >= 36.0
+    assert np.array_equal(given[inside], u[inside])
+    assert np.array_equal(given[outside], np.copysign(30.0, u[outside]))
+    slope = np.diff(given) / np.diff(u)
+    assert np.abs(np.diff(slope)).max() < 1.1 * 5e-3 / (2 * 0.2 * 30.0)  # a parabola: no kink
+    assert rig.limited(1e3, math.inf, 0.2) == 1e3
+
+
 @pytest.mark.parametrize("error", [-0.2, 0.07])
 def test_torque_gain_is_all_parameters_scaled(error):
     r = multisine_reference(7e-3)[:3000]

@@ -22,6 +22,7 @@ class Draw:
         scaled: settings that are a factor times the size.
         start: a size to start the search for the detection limit from.
         most: greatest size that makes sense.
+        least: least size that makes sense; 0 if there is none.
         shape: settings that do not depend on the size.
         clips: setting that limits the torque to (1.2 - size) of its peak without the effect.
         slows: setting that limits the torque's rate to its peak, sample to sample, over the size.
@@ -37,6 +38,7 @@ class Draw:
     clips: str | None = None
     slows: str | None = None
     absorbed: bool = False
+    least: float = 0.0
     same_as: Mapping[str, str] = field(default_factory=dict)
 
     def settings(self, size: float, peaks: Mapping[str, float]) -> dict[str, float]:
@@ -93,7 +95,8 @@ def _torque_bias(rng: np.random.Generator) -> Draw:
 def _presliding(rng: np.random.Generator) -> Draw:
     motor, link = [(1.0, 0.0), (0.0, 1.0), (1.0, _log(rng, 0.5, 2.0))][rng.integers(3)]
     scaled = {"presliding_motor_rad": motor, "presliding_link_rad": link}
-    return Draw("presliding_friction", {k: v for k, v in scaled.items() if v}, 2e-4, 5e-2)
+    return Draw("presliding_friction", {k: v for k, v in scaled.items() if v}, 2e-4, 5e-2,
+                least=2e-5)  # fmt: skip
 
 
 def _load(rng: np.random.Generator) -> Draw:

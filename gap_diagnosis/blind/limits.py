@@ -148,9 +148,12 @@ class Sizes:
     def showing(self, relative: float) -> float | None:
         """Return the size that shows that many times the detection limit, within a tenth.
 
-        Secant search on log size; None if even `draw.most` shows less.
+        Secant search on log size; None if even `draw.most` shows less, `draw.least` if that shows
+        more.
         """
-        low, high = self._draw.most * 1e-5, self._draw.most
+        low, high = max(self._draw.most * 1e-5, self._draw.least), self._draw.most
+        if self._draw.least and self.relative(low) > relative:
+            return low
         if self.relative(high) < relative:
             return None
         size = min(self._draw.start, high)

@@ -1,0 +1,216 @@
+"""Which ripples or third masses could explain what a model leaves: hundreds of shapes at once.
+
+A ripple over the motor angle acts as a torque on the motor, a third mass as one on the link. What
+it does to the position is predicted linearly: the torque along the model's own motion, times the
+response of the closed loop to a torque, Y/(R C) = G/(1 + G C), which the model's simulation gives
+at the excited lines. Only the best go on to be simulated, so that this may be rough.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from controller_node.transfer_function import as_transfer_function, law_of
+
+from .least_squares import Solution
+from .misfit import Misfit
+from .model import Model, Simulator
+from .records import RecordedExperiment, spectrum
+
+RIPPLES = ("position_friction", "kinematic_error", "cogging")
+"""Effects that are periodic in the motor angle."""
+CYCLES = np.concatenate([np.arange(0.5, 4.0, 0.25), np.arange(4.0, 40.0, 0.5), np.arange(40, 231)])
+"""Numbers of ripples per turn that are looked at; between them the response hardly changes."""
+MODES_HZ = np.geomspace(2.0, 110.0, 160)
+"""Frequencies of a third mass that are looked at, closer than its damping ratio makes it wide."""
+SCANNED: dict[str, tuple[str, np.ndarray]] = {
+    **dict.fromkeys(RIPPLES, ("cycles_per_turn", CYCLES)),
+    "extra_mode": ("frequency_hz", MODES_HZ),
+}
+"""The parameter that gives an effect its shape, and the values of it that are looked at."""
+
+_DAMPING_RATIO = 0.03
+
+
+@dataclass(frozen=True)
+class _Motion:
+    """One period of a model's motion, (realizations, N) each, and the loop's response to torque.
+
+    Attributes:
+        motor, velocity, transmitted: rad, rad/s, N m.
+        link: rad.
+        frequency: of the lines, imaginary, s = j omega (rad/s), (lines,).
+        response: complex (realizations, lines), position per torque on the motor, rad/(N m).
+        of_link: the same of a torque on the link.
+        both: the same of a torque between link and motor.
+    """
+
+    motor: np.ndarray
+    velocity: np.ndarray
+    transmitted: np.ndarray
+    link: np.ndarray
+    frequency: np.ndarray
+    response: np.ndarray
+    of_link: np.ndarray
+    both: np.ndarray
+
+
+def best_shapes(
+    effect: str,
+    recorded: RecordedExperiment,
+    simulator: Simulator,
+    misfit: Misfit,
+    model: Model,
+    parent: Solution,
+    most: int,
+) -> list[float]:
+    """Return the values of an effect's shape parameter that promise most, best first.
+
+    Args:
+        effect: one of SCANNED.
+        recorded: the experiment; its loop can be repeated.
+        simulator: repeats it.
+        misfit: of the realizations that count.
+        model: the parent's model.
+        parent: where the parent's fit ended.
+        most: how many to return, each a maximum of its own.
+    """
+    motion = _motion(recorded, simulator, misfit, model)
+    basis = np.linalg.qr(parent.jacobian)[0]
+    left = parent.residuals - basis @ (basis.T @ parent.residuals)
+    values = SCANNED[effect][1]
+    changes = (_changes(effect, value, motion, model.plant) for value in values.tolist())
+    gains = np.array([_lowered(misfit.errors_of(change), basis, left) for change in changes])
+    return [float(values[i]) for i in _peaks(gains)[:most]]
+
+
+def best_harmonics(
+    effect: str,
+    recorded: RecordedExperiment,
+    simulator: Simulator,
+    misfit: Misfit,
+    model: Model,
+    parent: Solution,
+    most: int,
+) -> list[tuple[float, float, float, float, float]]:
+    """Return the ripples with a second harmonic that promise most, best first.
+
+    Args: as of `best_shapes`, for one of RIPPLES.
+
+    Returns:
+        (size, cycles per turn, phase (rad), second harmonic over the first, its phase (rad)), at
+        the most `most`.
+    """
+    motion = _motion(recorded, simulator, misfit, model)
+    basis = np.linalg.qr(parent.jacobian)[0]
+    left = parent.residuals - basis @ (basis.T @ parent.residuals)
+    gains, weights = [], []
+    for cycles in CYCLES.tolist():
+        harmonics = [_of_ripple(effect, n * cycles, motion, model.plant) for n in (1, 2)]
+        columns = misfit.errors_of(np.concatenate(harmonics))
+        own = columns - (columns @ basis) @ basis.T
+        weights.append(np.linalg.lstsq(own.T, -left, rcond=1e-6)[0])
+        gains.append(-float(weights[-1] @ (own @ left)))
+    found = []
+    for i in _peaks(np.array(gains))[:most]:
+        first, second = complex(*weights[i][:2]), complex(*weights[i][2:])
+        phase, size = cmath.phase(first), max(abs(first), 0.1 * abs(second))
+        bend = math.remainder(cmath.phase(second) - 2.0 * phase, 2.0 * math.pi)
+        found.append((size, float(CYCLES[i]), phase, abs(second) / size, bend))
+    return found
+
+
+def _peaks(gains: np.ndarray) -> np.ndarray:
+    """Return the indices of the maxima, greatest first."""
+    padded = np.concatenate([[-1.0], gains, [-1.0]])
+    peaks = np.flatnonzero((gains >= padded[:-2]) & (gains > padded[2:]))
+    return peaks[np.argsort(-gains[peaks])]
+
+
+def _motion(
+    recorded: RecordedExperiment, simulator: Simulator, misfit: Misfit, model: Model
+) -> _Motion:
+    description = recorded.experiment
+    y, _, q = simulator.motion(model, misfit.which)
+    lines = np.arange(recorded.lines)
+    excited = np.array(description.excited_harmonics)
+    z = np.exp(2j * np.pi * lines / description.samples_per_period)
+    law = as_transfer_function(law_of(description.controller, description.sample_rate_hz))
+    powers = z[:, None] ** -np.arange(law.numerator.size)
+    controller = (powers @ law.numerator) / (powers @ law.denominator)
+    r = [recorded.realizations[i].played[-1] for i in misfit.which]
+    loop = spectrum(y, lines.size) / (spectrum(np.array(r), lines.size) + 1e-300)
+    response = np.array([_between(lines, excited, row[excited]) for row in loop]) / controller
+    p, s = model.plant, 2j * np.pi * lines * description.base_frequency_hz
+    twist = q - y
+    return _Motion(
+        motor=y,
+        velocity=np.gradient(y, axis=1) * description.sample_rate_hz,
+        transmitted=p.get("k0", 0.0) * twist,
+        link=q,
+        frequency=s,
+        response=response,
+        of_link=response * (1.0 - _of_pair(p, s)),
+        both=response * _of_pair(p, s),
+    )
+
+
+def _of_pair(p: Mapping[str, float], s: np.ndarray) -> np.ndarray:
+    """Return the motor torque that acts as 1 N m on the motor against the link does."""
+    if "k0" not in p:
+        return np.ones(s.size)
+    free = p["j"] * s**2 + p["fv"] * s
+    return free / (free + p["k0"])
+
+
+def _between(lines: np.ndarray, known: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Interpolate a response in magnitude and phase."""
+    size = np.interp(lines, known, np.log(np.abs(values)))
+    return np.exp(size + 1j * np.interp(lines, known, np.unwrap(np.angle(values))))
+
+
+def _changes(effect: str, value: float, motion: _Motion, plant: Mapping[str, float]) -> np.ndarray:
+    """Return how the lines of y change, by each unknown size: complex (n, realizations, lines)."""
+    if effect == "extra_mode":
+        return _of_third_mass(value, motion)[None]
+    return _of_ripple(effect, value, motion, plant)
+
+
+def _of_third_mass(frequency_hz: float, motion: _Motion) -> np.ndarray:
+    """Return the change by a third mass of 1 kg m^2 behind a spring on the link, not felt by it."""
+    s, omega = motion.frequency, 2.0 * np.pi * frequency_hz
+    spring = omega**2 + 2.0 * _DAMPING_RATIO * omega * s
+    torque = -(s**2) * spring / (s**2 + spring)
+    return spectrum(motion.link, s.size) * torque * motion.of_link
+
+
+def _of_ripple(
+    effect: str, cycles: float, motion: _Motion, plant: Mapping[str, float]
+) -> np.ndarray:
+    """Return the changes by the sine and the cosine of a ripple of size 1."""
+    angle = cycles * motion.motor
+    turns = np.array([np.sin(angle), np.cos(angle)])
+    lines = motion.response.shape[-1]
+    if effect == "position_friction":
+        changes = spectrum(-turns * np.sign(motion.velocity), lines) * motion.response
+    elif effect == "cogging":
+        changes = spectrum(turns, lines) * motion.response
+    else:
+        slopes = cycles * np.array([np.cos(angle), -np.sin(angle)])
+        changes = spectrum(plant["k0"] * turns, lines) * motion.both
+        changes -= spectrum(slopes * motion.transmitted, lines) * motion.response
+    return changes
+
+
+def _lowered(columns: np.ndarray, basis: np.ndarray, left: np.ndarray) -> float:
+    """Return how far the best sizes would lower the chi-square; a lone size is positive."""
+    own = columns - (columns @ basis) @ basis.T
+    weights = np.linalg.lstsq(own.T, -left, rcond=1e-9)[0]
+    if weights.size == 1 and weights[0] < 0.0:
+        return 0.0
+    return -float(weights @ (own @ left))
