@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import math
 import shlex
-import sys
 from collections.abc import Sequence
-from datetime import datetime
 from pathlib import Path
 
 import typer
@@ -24,6 +22,7 @@ from gap_diagnosis.nominal import read_nominal, refuse_wrong_units
 from gap_diagnosis.records import read_experiment
 from gap_diagnosis.verdict_words import WORDS, explanation, headline, summaries, unit_of
 
+from .invocation import call_date, command_line
 from .progress import ProgressLine
 
 RANKED = 5
@@ -91,8 +90,8 @@ def diagnose_folder(
             found,
             out or folder / "diagnosis",
             progress=progress.describe,
-            command=shlex.join(["fjr", *sys.argv[1:]]),
-            date=datetime.now().astimezone().isoformat(timespec="seconds"),
+            command=command_line(),
+            date=call_date(),
         )
     print_summary(found.diagnosis, Console(), report.parent)
     if found.diagnosis.parameters and not has_known_law(recorded):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
-import sys
 from enum import Enum
 from pathlib import Path
 from typing import Annotated
@@ -11,6 +9,7 @@ from typing import Annotated
 import typer
 
 from ..guard import INTERRUPTED, guarded
+from ..invocation import command_line
 from ..run_commands import Rig, Set
 
 NO_GO = 3
@@ -110,7 +109,7 @@ def rehearse(
         confirm=confirm,
         network=network,
         overrides=parse_settings(settings or []),
-        command=shlex.join(["fjr", *sys.argv[1:]]),
+        command=command_line(),
     )
     with RehearsalProgress() as progress:
         found, report, interrupted = run(options, progress)
