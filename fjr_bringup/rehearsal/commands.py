@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from ..guard import INTERRUPTED, guarded
+from ..guard import INTERRUPTED, guarded, needing_ros
 from ..invocation import command_line
 from ..run_commands import Rig, Set
 
@@ -86,15 +86,9 @@ def rehearse(
     from ..execute import parse_settings
     from .progress import RehearsalProgress
 
-    try:
+    with needing_ros():
         from .options import Options
         from .rehearse import rehearse as run
-    except ImportError as error:
-        from fjr_interface.errors import InputError
-
-        raise InputError(
-            f"ROS 2 is not there ({error}); install fjr-rig[ros] or source ROS 2 Jazzy."
-        ) from None
 
     options = Options(
         rig=rig,
