@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import math
-import shlex
-import sys
 from collections.abc import Sequence
-from datetime import datetime
 from functools import partial
 from pathlib import Path
 
@@ -28,6 +25,8 @@ from fjr_interface.parameters import Value
 from fjr_interface.resampling import Resampling
 from fjr_sim_node.linear import DESCRIPTIONS, g0
 from fjr_sim_node.plant import PLANT
+
+from .invocation import call_date, command_line
 
 
 def analyze_folder(
@@ -85,8 +84,8 @@ def analyze_folder(
             result,
             out,
             progress=lambda name: progress.update(task, description=f"writing {name}"),
-            command=shlex.join(["fjr", *sys.argv[1:]]),
-            date=datetime.now().astimezone().isoformat(timespec="seconds"),
+            command=command_line(),
+            date=call_date(),
         )
     print_summary(result, Console())
     return report

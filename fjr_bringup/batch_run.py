@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import os
-import signal
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from pathlib import Path
 
 from fjr_interface.bag_writer import BagWriter
 from fjr_sim_node.simulator import run_realization
 
 from .campaign import Campaign, bag_folder
-from .processes import die_with
+from .cores import worker_count, worker_pool
 from .progress import CampaignProgress
 
 
@@ -35,23 +32,12 @@ def simulate_campaign(
     """
     pending = campaign.open_folder(folder)
     progress.expect(campaign, pending)
-    workers = min(workers or len(os.sched_getaffinity(0)), len(pending))
-    if workers <= 1:
+    count = worker_count(workers, len(pending))
+    if count <= 1:
         return [_finish(progress, *_simulate(campaign, folder, *run)) for run in pending]
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, context, _begin_worker, (os.getpid(),)) as pool:
+    with worker_pool(count) as pool:
         futures = [pool.submit(_simulate, campaign, folder, *run) for run in pending]
-        try:
-            return [_finish(progress, *future.result()) for future in as_completed(futures)]
-        except BaseException:
-            pool.shutdown(cancel_futures=True)
-            raise
-
-
-def _begin_worker(parent: int) -> None:
-    """Leave Ctrl-C to the parent, which lets the bags under way be finished; end with it."""
-    die_with(parent)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+        return [_finish(progress, *future.result()) for future in as_completed(futures)]
 
 
 def _simulate(campaign: Campaign, folder: Path, level: int, realization: int) -> tuple[Path, float]:

@@ -9,9 +9,8 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
-from fjr_interface.errors import InputError
-
 from .campaign import Campaign
+from .guard import needing_ros
 from .measured import MeasuredLevel, read_levels, simulate_level
 from .progress import CampaignProgress
 
@@ -47,13 +46,8 @@ def graph_bench(out: Path) -> Bench:
     Raises:
         InputError: there is no ROS 2.
     """
-    try:
+    with needing_ros(", or leave --graph out"):
         from .graph_run import run_campaign
-    except ImportError as error:
-        raise InputError(
-            f"ROS 2 is not there ({error}); install fjr-rig[ros] or source ROS 2 Jazzy, or leave "
-            "--graph out."
-        ) from None
 
     def measure(campaign: Campaign, name: str) -> MeasuredLevel:
         folder = out / name

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Collection
-from types import TracebackType
 from typing import Any
 
 import rclpy
@@ -42,12 +41,7 @@ class Rig:
         self._executor.add_node(self._node)
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Leave the domain."""
         self._executor.shutdown()
         self._node.destroy_node()

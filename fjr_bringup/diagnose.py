@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import math
 import shlex
-import sys
 from collections.abc import Sequence
-from datetime import datetime
 from pathlib import Path
 
 import typer
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
-from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.progress import SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from fjr_interface.bag_reader import SignalMap
@@ -24,34 +22,25 @@ from gap_diagnosis.nominal import read_nominal, refuse_wrong_units
 from gap_diagnosis.records import read_experiment
 from gap_diagnosis.verdict_words import WORDS, explanation, headline, summaries, unit_of
 
+from .invocation import call_date, command_line
+from .progress import ProgressLine
+
 RANKED = 5
 """How many explanations the summary on the terminal shows."""
 
 
-class StageProgress:
-    """A context manager that shows the stage under way on stderr, as lines without a terminal."""
+class StageProgress(ProgressLine):
+    """Shows the stage under way, as lines without a terminal."""
 
     def __init__(self) -> None:
         """Show on stderr."""
-        self._console = Console(stderr=True)
-        self._bar = Progress(
+        super().__init__(
             SpinnerColumn(),
             TextColumn("{task.description}", markup=False),
             TimeElapsedColumn(),
-            console=self._console,
             transient=True,
-            disable=not self._console.is_terminal,
+            total=None,
         )
-        self._task = self._bar.add_task("starting", total=None)
-
-    def __enter__(self) -> StageProgress:
-        """Start drawing."""
-        self._bar.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Stop drawing."""
-        self._bar.stop()
 
     def describe(self, stage: str) -> None:
         """Say what is being done."""
@@ -60,7 +49,7 @@ class StageProgress:
             self.say(stage)
 
     def say(self, sentence: str) -> None:
-        """Print a sentence above the bar."""
+        """Print a sentence above the line; one that is long stays one line in a log."""
         self._console.print(sentence, highlight=False, markup=False, soft_wrap=True)
 
 
@@ -101,8 +90,8 @@ def diagnose_folder(
             found,
             out or folder / "diagnosis",
             progress=progress.describe,
-            command=shlex.join(["fjr", *sys.argv[1:]]),
-            date=datetime.now().astimezone().isoformat(timespec="seconds"),
+            command=command_line(),
+            date=call_date(),
         )
     print_summary(found.diagnosis, Console(), report.parent)
     if found.diagnosis.parameters and not has_known_law(recorded):

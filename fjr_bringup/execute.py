@@ -16,7 +16,7 @@ from fjr_interface.errors import InputError
 from fjr_interface.parameter_file import parse_value
 
 from .campaign import CAMPAIGN_FILE, GROUPS, Campaign
-from .guard import INTERRUPTED
+from .guard import INTERRUPTED, needing_ros
 from .progress import CampaignProgress
 
 Overrides = dict[str, dict[str, Any]]
@@ -49,17 +49,20 @@ def parse_settings(settings: Sequence[str]) -> Overrides:
     return overrides
 
 
+def overridden(settings: Sequence[str] | None, **excitation: Any) -> Overrides:
+    """Parse settings (see `parse_settings`); values of the excitation win over them, not None."""
+    overrides = parse_settings(settings or [])
+    given = {name: value for name, value in excitation.items() if value is not None}
+    overrides["excitation"] = {**overrides.get("excitation", {}), **given}
+    return overrides
+
+
 def run_in_graph(
     rig: Path | None, out: Path | None, overrides: Overrides, *, composed: bool = False
 ) -> Path:
     """Run a campaign through the ROS graph; return its folder (see `_execute`)."""
-    try:
+    with needing_ros(", or use fjr simulate"):
         from .graph_run import run_campaign
-    except ImportError as error:
-        raise InputError(
-            f"ROS 2 is not there ({error}); install fjr-rig[ros] or source ROS 2 Jazzy, or use "
-            "fjr simulate."
-        ) from None
 
     runner = partial(run_campaign, composed=composed)
     return _execute("run", runner, rig, out, overrides)

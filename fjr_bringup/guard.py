@@ -6,7 +6,8 @@ import functools
 import os
 import tempfile
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any, TypeVar
 
 import typer
@@ -47,6 +48,21 @@ def guarded(kept: str) -> Callable[[Command], Command]:
         return guard  # type: ignore[return-value]
 
     return decorate
+
+
+@contextmanager
+def needing_ros(otherwise: str = "") -> Iterator[None]:
+    """Turn an import that fails in the body into an InputError.
+
+    Args:
+        otherwise: what else the user may do, as in ', or use fjr simulate'.
+    """
+    try:
+        yield
+    except ImportError as error:
+        raise InputError(
+            f"ROS 2 is not there ({error}); install fjr-rig[ros] or source ROS 2 Jazzy{otherwise}."
+        ) from None
 
 
 def _leave(sentence: str, status: int) -> None:

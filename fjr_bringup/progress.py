@@ -1,51 +1,87 @@
-"""Progress of a campaign: realization, simulated time, speed against real time, time left."""
+"""What is shown on stderr while something takes long: a line of its own, and a campaign's."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from types import TracebackType
+from typing import Any, TypeVar
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import (
+    BarColumn,
+    Progress,
+    ProgressColumn,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 
 from .campaign import Campaign
 
+_Line = TypeVar("_Line", bound="ProgressLine")
 
-class CampaignProgress:
-    """A context manager that shows simulated seconds against those to come, on stderr.
+
+class ProgressLine:
+    """A context manager that shows one line on stderr, or nothing of it without a terminal."""
+
+    def __init__(
+        self,
+        *columns: ProgressColumn,
+        console: Console | None = None,
+        transient: bool = False,
+        **fields: Any,
+    ) -> None:
+        """Prepare the line.
+
+        Args:
+            columns: what stands in it.
+            console: where to show it; None for stderr.
+            transient: whether it goes away at the end.
+            fields: total and own fields of the columns, at the start.
+        """
+        self._console = console or Console(stderr=True)
+        self._bar = Progress(
+            *columns,
+            console=self._console,
+            transient=transient,
+            disable=not self._console.is_terminal,
+        )
+        self._task = self._bar.add_task("starting", **fields)
+
+    def __enter__(self: _Line) -> _Line:
+        """Start drawing."""
+        self._bar.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Stop drawing."""
+        self._bar.stop()
+
+    def say(self, sentence: str) -> None:
+        """Print a sentence above the line."""
+        self._console.print(sentence, highlight=False, markup=False)
+
+
+class CampaignProgress(ProgressLine):
+    """Shows simulated seconds against those to come, the speed and the time left.
 
     Without a terminal it prints one line for each finished realization instead.
     """
 
     def __init__(self, console: Console | None = None, done: str = "simulated") -> None:
         """Show on a console, stderr by default; `done` says what happens to the seconds."""
-        self._console = console or Console(stderr=True)
-        self._bar = Progress(
+        super().__init__(
             TextColumn("{task.description}"),
             BarColumn(),
             TextColumn(f"{{task.completed:.0f}}/{{task.fields[expected]:.0f}} s {done}"),
             TextColumn("{task.fields[speed]}"),
             TimeElapsedColumn(),
             TimeRemainingColumn(),
-            console=self._console,
-            disable=not self._console.is_terminal,
+            console=console,
+            total=None,
+            expected=0.0,
+            speed="",
         )
-        self._task = self._bar.add_task("starting", total=None, expected=0.0, speed="")
         self._before_s = 0.0
-
-    def __enter__(self) -> CampaignProgress:
-        """Start drawing."""
-        self._bar.start()
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """Stop drawing."""
-        self._bar.stop()
 
     def expect(self, campaign: Campaign, pending: Sequence[tuple[int, int]]) -> None:
         """Take the sum of the pending realizations for the whole; say what is there already."""
@@ -58,10 +94,6 @@ class CampaignProgress:
     def expect_s(self, seconds: float) -> None:
         """Take so many simulated seconds for the whole."""
         self._bar.update(self._task, total=seconds, expected=seconds)
-
-    def say(self, sentence: str) -> None:
-        """Print a sentence above the bar."""
-        self._console.print(sentence, highlight=False, markup=False)
 
     def describe(self, text: str) -> None:
         """Say what is being done."""

@@ -53,19 +53,16 @@ def _overrides(
     seed: int | None,
     settings: list[str] | None,
 ) -> dict[str, dict[str, object]]:
-    from .execute import parse_settings
+    from .execute import overridden
 
-    named = {
-        "amplitudes_rad": tuple(levels) if levels else None,
-        "realizations": realizations,
-        "periods": periods,
-        "transient_periods": transient_periods,
-        "seed": seed,
-    }
-    given = {name: value for name, value in named.items() if value is not None}
-    overrides = parse_settings(settings or [])
-    overrides["excitation"] = {**overrides.get("excitation", {}), **given}
-    return overrides
+    return overridden(
+        settings,
+        amplitudes_rad=tuple(levels) if levels else None,
+        realizations=realizations,
+        periods=periods,
+        transient_periods=transient_periods,
+        seed=seed,
+    )
 
 
 @guarded(kept="nothing was recorded")

@@ -24,12 +24,9 @@ Graph = Annotated[
 
 def _campaign(rig: Path | None, settings: list[str] | None, **excitation: Any) -> Any:
     from .campaign import Campaign
-    from .execute import parse_settings
+    from .execute import overridden
 
-    overrides = parse_settings(settings or [])
-    given = {name: value for name, value in excitation.items() if value is not None}
-    overrides["excitation"] = {**overrides.get("excitation", {}), **given}
-    return Campaign.create(rig, overrides)
+    return Campaign.create(rig, overridden(settings, **excitation))
 
 
 def _bench(graph: bool, out: Path) -> Any:

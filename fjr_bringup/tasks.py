@@ -11,12 +11,10 @@ import contextlib
 import hashlib
 import inspect
 import json
-import multiprocessing
 import os
-import signal
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -27,7 +25,7 @@ import numpy as np
 from fjr_interface.errors import InputError
 from fjr_interface.installed import sources
 
-from .processes import die_with
+from .cores import worker_count, worker_pool
 
 Arrays = dict[str, np.ndarray]
 Report = Callable[[int, int, str], None]
@@ -113,28 +111,17 @@ def _computed(
 ) -> Iterator[tuple[Task, Mapping[str, Any]]]:
     if scheduler and pending:
         return _on_cluster(pending, scheduler)
-    count = min(workers or len(os.sched_getaffinity(0)), len(pending))
+    count = worker_count(workers, len(pending))
     if count > 1:
         return _on_cores(pending, count)
     return ((task, task.function(**task.parameters)) for task in pending)
 
 
 def _on_cores(pending: Sequence[Task], count: int) -> Iterator[tuple[Task, Mapping[str, Any]]]:
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(count, context, _begin_worker, (os.getpid(),)) as pool:
+    with worker_pool(count) as pool:
         futures = {pool.submit(task.function, **task.parameters): task for task in pending}
-        try:
-            for future in as_completed(futures):
-                yield futures[future], future.result()
-        except BaseException:
-            pool.shutdown(cancel_futures=True)
-            raise
-
-
-def _begin_worker(parent: int) -> None:
-    """Leave Ctrl-C to the parent, and end with it."""
-    die_with(parent)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+        for future in as_completed(futures):
+            yield futures[future], future.result()
 
 
 def _on_cluster(

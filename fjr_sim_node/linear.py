@@ -55,8 +55,7 @@ def continuous_g0(
     """Return G0(j 2 pi f) in rad/(N m), complex of the shape of `frequency_hz` (paper.md, G0)."""
     a, b = state_space(parameters, damping)
     s = 2j * np.pi * np.asarray(frequency_hz, float)
-    resolvent = s[..., None, None] * np.eye(4) - a
-    return np.linalg.solve(resolvent, np.broadcast_to(b[:, None], (*s.shape, 4, 1)))[..., 2, 0]
+    return _states(s, a, b)[..., 2]
 
 
 def g0(
@@ -92,9 +91,13 @@ def zoh_states(
     """
     transition, held = held_torque(*state_space(parameters, damping), 1.0 / sample_rate_hz)
     z = np.exp(2j * np.pi * np.asarray(frequency_hz, float) / sample_rate_hz)
-    resolvent = z[..., None, None] * np.eye(4) - transition
-    column = np.broadcast_to(held[:, None], (*z.shape, 4, 1))
-    return np.linalg.solve(resolvent, column)[..., 0]
+    return _states(z, transition, held)
+
+
+def _states(at: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return (at I - a)^-1 b for each complex number of `at`: its shape and one axis of states."""
+    resolvent = at[..., None, None] * np.eye(4) - a
+    return np.linalg.solve(resolvent, np.broadcast_to(b[:, None], (*at.shape, 4, 1)))[..., 0]
 
 
 def held_torque(a: np.ndarray, b: np.ndarray, seconds: float) -> tuple[np.ndarray, np.ndarray]:

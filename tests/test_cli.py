@@ -12,7 +12,6 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from fjr_bringup.cli import app
 from fjr_bringup.guard import guarded
 from fjr_interface.bag_writer import BagWriter
 from fjr_interface.errors import InputError
@@ -22,13 +21,6 @@ from fjr_sim_node.linear import g0
 from fjr_sim_node.plant import PLANT
 
 RATE_HZ, N, LINES = 1000.0, 500, [1, 3, 5, 9, 11, 15, 17]
-
-
-@pytest.fixture
-def run(monkeypatch):
-    monkeypatch.setenv("COLUMNS", "200")
-    monkeypatch.delenv("FJR_DEBUG", raising=False)
-    return lambda *arguments: CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
 @pytest.fixture(scope="module")

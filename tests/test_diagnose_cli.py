@@ -11,21 +11,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from gap_cases import simulate_case, write_bags
-from typer.testing import CliRunner
 
-from fjr_bringup.cli import app
 from fjr_interface.parameter_file import save_parameter_file
 from fjr_sim_node.plant import PLANT
 from gap_diagnosis.diagnosis import Diagnosis
 
 SHORT = {"base_frequency_hz": 0.5, "transient_periods": 2, "levels_rad": (3e-3, 1e-2)}
-
-
-@pytest.fixture
-def run(monkeypatch):
-    monkeypatch.setenv("COLUMNS", "200")
-    monkeypatch.delenv("FJR_DEBUG", raising=False)
-    return lambda *arguments: CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
 @pytest.fixture(scope="module")

@@ -12,30 +12,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bag_tools import MS, STORE, Stream, experiment, foreign_bag, refusal, signals, stream
-from rosbags.interfaces import (
-    Qos,
-    QosDurability,
-    QosHistory,
-    QosLiveliness,
-    QosReliability,
-    QosTime,
-)
+from rosbags.interfaces import QosHistory, QosReliability
 
 from fjr_interface.bag_reader import BagReader, read_record
+from fjr_interface.bag_writer import SIGNAL_QOS
 from fjr_interface.topics import SIGNALS
 
 WALL_NS = 1_790_000_000_123_456_789
-FOREVER = QosTime(9223372036, 854775807)
-QUEUE_OF_TEN = Qos(
-    QosHistory.UNKNOWN,
-    0,
-    QosReliability.BEST_EFFORT,
-    QosDurability.VOLATILE,
-    FOREVER,
-    FOREVER,
-    QosLiveliness.AUTOMATIC,
-    FOREVER,
-    False,
+QUEUE_OF_TEN = SIGNAL_QOS._replace(
+    history=QosHistory.UNKNOWN, depth=0, reliability=QosReliability.BEST_EFFORT
 )
 DESCRIBED = experiment()
 SAMPLES = DESCRIBED.samples

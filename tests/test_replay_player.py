@@ -10,15 +10,9 @@ import numpy as np
 import pytest
 from bag_tools import MS, STORE, Stream, experiment, foreign_bag, rig_streams, write_bag
 from ros_domain import Peer, Started, Starter, marked_processes
-from rosbags.interfaces import (
-    Qos,
-    QosDurability,
-    QosHistory,
-    QosLiveliness,
-    QosReliability,
-    QosTime,
-)
+from rosbags.interfaces import QosHistory, QosReliability, QosTime
 
+from fjr_interface.bag_writer import EXPERIMENT_QOS, SIGNAL_QOS
 from fjr_interface.experiment import Experiment
 from fjr_interface.topics import SIGNALS
 
@@ -123,17 +117,8 @@ def test_chosen_topics_from_an_offset_again_and_again_until_ctrl_c(start, mark, 
 
 def foreign(folder: Path) -> Path:
     """Write a bag of another recorder: own clock, best effort, a type that is not installed."""
-    forever = QosTime(9223372036, 854775807)
-    offered = Qos(
-        QosHistory.UNKNOWN,
-        0,
-        QosReliability.BEST_EFFORT,
-        QosDurability.VOLATILE,
-        forever,
-        forever,
-        QosLiveliness.AUTOMATIC,
-        forever,
-        False,
+    offered = SIGNAL_QOS._replace(
+        history=QosHistory.UNKNOWN, depth=0, reliability=QosReliability.BEST_EFFORT
     )
     whole = rig_streams({symbol: list(range(1, 61)) for symbol in "ryu"})
     streams: dict[str, Stream] = {
@@ -248,7 +233,6 @@ def test_recorded_offers_become_publishers_as_in_rosbag2():
     from rclpy.qos import DurabilityPolicy, HistoryPolicy, ReliabilityPolicy
 
     from fjr_bringup.replay.messages import to_offer
-    from fjr_interface.bag_writer import EXPERIMENT_QOS, SIGNAL_QOS
 
     latched = to_offer([EXPERIMENT_QOS])
     assert latched.durability == DurabilityPolicy.TRANSIENT_LOCAL and latched.depth == 1

@@ -6,11 +6,8 @@ import json
 import math
 import os
 import platform
-import shlex
-import sys
 import time
 from collections.abc import Sequence
-from datetime import datetime
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -23,6 +20,7 @@ from bla_analyzer.figure_style import save
 from fjr_interface.errors import InputError
 from fjr_interface.installed import product_version
 
+from ..invocation import call_date, command_line
 from ..tasks import Arrays, Task, run_tasks
 from . import (
     certificate,
@@ -184,8 +182,8 @@ def _replace(file: Path, text: str) -> None:
 
 def _provenance(seconds: float) -> dict[str, str]:
     return {
-        "command": shlex.join(["fjr", *sys.argv[1:]]),
-        "date": datetime.now().astimezone().isoformat(timespec="seconds"),
+        "command": command_line(),
+        "date": call_date(),
         "computed in": f"{seconds:.0f} s on {len(os.sched_getaffinity(0))} cores (less what was "
         "taken up from before)",
         "versions": f"Python {platform.python_version()}, fjr-rig {product_version()}, "

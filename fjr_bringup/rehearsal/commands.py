@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import shlex
-import sys
 from enum import Enum
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from ..guard import INTERRUPTED, guarded
+from ..guard import INTERRUPTED, guarded, needing_ros
+from ..invocation import command_line
 from ..run_commands import Rig, Set
 
 NO_GO = 3
@@ -87,15 +86,9 @@ def rehearse(
     from ..execute import parse_settings
     from .progress import RehearsalProgress
 
-    try:
+    with needing_ros():
         from .options import Options
         from .rehearse import rehearse as run
-    except ImportError as error:
-        from fjr_interface.errors import InputError
-
-        raise InputError(
-            f"ROS 2 is not there ({error}); install fjr-rig[ros] or source ROS 2 Jazzy."
-        ) from None
 
     options = Options(
         rig=rig,
@@ -110,7 +103,7 @@ def rehearse(
         confirm=confirm,
         network=network,
         overrides=parse_settings(settings or []),
-        command=shlex.join(["fjr", *sys.argv[1:]]),
+        command=command_line(),
     )
     with RehearsalProgress() as progress:
         found, report, interrupted = run(options, progress)

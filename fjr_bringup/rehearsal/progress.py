@@ -3,58 +3,38 @@
 from __future__ import annotations
 
 import time
-from types import TracebackType
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn
+from rich.progress import BarColumn, TextColumn
 
+from ..progress import ProgressLine
 from .timing import LoopTiming
 
 _LINE_EVERY_S = 10.0
 
 
-class RehearsalProgress:
-    """A context manager that shows a progress line on stderr.
+class RehearsalProgress(ProgressLine):
+    """Shows time against the whole, and how the last samples did.
 
     Without a terminal it prints a line every 10 s instead.
     """
 
     def __init__(self, console: Console | None = None) -> None:
         """Show on a console, stderr by default."""
-        self._console = console or Console(stderr=True)
-        self._bar = Progress(
+        super().__init__(
             BarColumn(),
             TextColumn("{task.completed:.0f}/{task.total:.0f} s"),
             TextColumn("{task.description}"),
-            console=self._console,
-            disable=not self._console.is_terminal,
+            console=console,
+            total=1.0,
         )
         self._total_s = 0.0
         self._printed = time.monotonic()
-        self._task = self._bar.add_task("starting", total=1.0)
-
-    def __enter__(self) -> RehearsalProgress:
-        """Start drawing."""
-        self._bar.start()
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """Stop drawing."""
-        self._bar.stop()
 
     def expect(self, total_s: float) -> None:
         """Say how long it will take."""
         self._total_s = total_s
         self._bar.update(self._task, total=total_s)
-
-    def say(self, sentence: str) -> None:
-        """Print a sentence above the line."""
-        self._console.print(sentence, highlight=False, markup=False)
 
     def show(self, passed_s: float, recent: LoopTiming) -> None:
         """Show how the last samples did."""

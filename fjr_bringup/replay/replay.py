@@ -8,6 +8,7 @@ import typer
 
 from fjr_interface.errors import InputError
 
+from ..guard import needing_ros
 from .bag import the_bag
 from .options import IntoGraph, Publishing
 
@@ -32,20 +33,12 @@ def replay_bag(bag: Path, graph: IntoGraph, publishing: Publishing) -> None:
     from .plan import plan_replay
 
     plan = plan_replay(bag, graph.into, graph.rig, graph.settings)
-    try:
+    with needing_ros():
         from .graph import replay_into
-    except ImportError as error:
-        raise _no_ros(error) from None
     typer.echo(replay_into(plan, graph.out))
 
 
 def _publish(bag: Path, publishing: Publishing) -> None:
-    try:
+    with needing_ros():
         from .player import publish_bag
-    except ImportError as error:
-        raise _no_ros(error) from None
     publish_bag(the_bag(bag), publishing)
-
-
-def _no_ros(error: ImportError) -> InputError:
-    return InputError(f"ROS 2 is not there ({error}); install fjr-rig[ros] or source ROS 2 Jazzy.")
