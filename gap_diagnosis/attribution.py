@@ -179,7 +179,7 @@ class Search:
         """Give second harmonics to the ripples of the explanations that are near the best."""
         ranked = self._ranked(count)
         for fit in ranked[:_FINALISTS]:
-            near = self.misfit(fit) < _NEAR * self.misfit(ranked[0])
+            near = self.misfit(fit) < _CLOSE * self.misfit(ranked[0])
             if near and self.misfit(fit) > _WORTH_A_HARMONIC and set(fit.effects) & set(RIPPLES):
                 self._progress(f"{' + '.join(fit.effects)}, second harmonic")
                 self._fits[fit.effects] = self._fitter.with_second_harmonics(fit)
@@ -218,6 +218,8 @@ class Search:
             if self.misfit(parent) < _NEAR * self.misfit(best):
                 others = [e for e in self._fitter.catalogue if e not in parent.effects]
                 self._extend(parent, others, _PROMISING_SECONDS)
+            if any(self.misfit(pair) < NOTHING_LEFT for pair in self._ranked(2)):
+                break
         self._swap(best)
         self._polish(2)
         self._enrich(2)

@@ -16,14 +16,13 @@ from .model import LINK_EFFECTS, Model, Simulator
 from .records import RecordedExperiment
 from .screening import Proposal, Screening
 from .search_space import STARTS, TOLERANCE, Space, space_for, starts
-from .shape_scan import RIPPLES, SCANNED, best_harmonics, best_shapes
+from .shape_scan import RIPPLES, SCANNED, TRIED, best_harmonics, best_shapes
 
 _KEPT_STARTS = 2
 _MOST_STEPS = 40
 _MORE_STEPS = 160  # along a valley in which sizes and parameters nearly replace each other
 _NESTED_STEPS = 3
 _FIRST_STEPS = 6
-_SHAPES_TRIED = 4
 _WORTH_A_HARMONIC = 0.9
 _RIVAL = 1.5  # a second start that stays this far above the first is not pursued
 _NO_PROMISE = 0.998  # of the parent's chi-square: a start that gains less is not pursued far
@@ -167,7 +166,7 @@ class Fitter:
         if effect in SCANNED and self._recorded.repeatable:
             shapes[SCANNED[effect][0]] = best_shapes(
                 effect, self._recorded, self._simulator, self.train,
-                parent.model, parent.solution, _SHAPES_TRIED,
+                parent.model, parent.solution, TRIED[effect],
             )  # fmt: skip
         return Screening(
             parent.solution,
@@ -238,8 +237,9 @@ class Fitter:
                 *self._second_harmonics(fit, effect),
                 *self._two_harmonics(fit, effect),
             ):
-                richer = self._solve(fit.effects, space, point, known=known)
-                if richer.converged and richer.train_chi2 < _WORTH_A_HARMONIC * fit.train_chi2:
+                worth = _WORTH_A_HARMONIC * fit.train_chi2
+                richer = self._solve(fit.effects, space, point, worth, known=known)
+                if richer.converged and richer.train_chi2 < worth:
                     fit = richer
                     break
         return fit
@@ -267,7 +267,7 @@ class Fitter:
         names = (size, *shape, f"{effect}.second_ratio", f"{effect}.second_phase_rad")
         promising = best_harmonics(
             effect, self._recorded, self._simulator, self.train,
-            rest.model, rest.solution, _SHAPES_TRIED,
+            rest.model, rest.solution, TRIED[effect],
         )  # fmt: skip
         found = []
         for values in promising:

@@ -26,13 +26,15 @@ RIPPLES = ("position_friction", "kinematic_error", "cogging")
 """Effects that are periodic in the motor angle."""
 CYCLES = np.concatenate([np.arange(0.5, 4.0, 0.25), np.arange(4.0, 40.0, 0.5), np.arange(40, 231)])
 """Numbers of ripples per turn that are looked at; between them the response hardly changes."""
-MODES_HZ = np.geomspace(2.0, 110.0, 160)
+MODES_HZ = np.geomspace(4.0, 110.0, 140)
 """Frequencies of a third mass that are looked at, closer than its damping ratio makes it wide."""
 SCANNED: dict[str, tuple[str, np.ndarray]] = {
     **dict.fromkeys(RIPPLES, ("cycles_per_turn", CYCLES)),
     "extra_mode": ("frequency_hz", MODES_HZ),
 }
 """The parameter that gives an effect its shape, and the values of it that are looked at."""
+TRIED = {**dict.fromkeys(RIPPLES, 4), "extra_mode": 10}
+"""How many of them are worth a simulation; a narrow band is predicted less well than a ripple."""
 
 _DAMPING_RATIO = 0.03
 
