@@ -54,7 +54,6 @@ _WORTH_A_HARMONIC = 1.3
 _SECOND_PROMISE = 1.2  # a second effect that has not gained that much after a few steps is dropped
 _PROMISING_SECONDS = 5
 _PROMISING_PARTNERS = 2
-_SWAPPED = 3  # effects to put in the place of a member of the best pair
 _SCREENED = 2  # times as many are tried at several sizes as are fitted
 
 Progress = Callable[[str], None]
@@ -139,7 +138,6 @@ class Search:
         parent: Fit,
         effects: Sequence[str],
         most: int | None = None,
-        like: Sequence[str] = (),
     ) -> None:
         """Fit the parent with each effect more, in the order of what their starts achieve.
 
@@ -147,24 +145,21 @@ class Search:
             parent: the explanation to extend.
             effects: identifiers to add, one at a time.
             most: how many of them to pursue; None for all.
-            like: effects whose near equivalents are pursued besides.
         """
         rivals = [fit.train_chi2 for fit in self._ranked(len(parent.effects) + 1)]
         least = min(parent.train_chi2, *rivals) if rivals else parent.train_chi2
+        effects = [e for e in effects if not self._settled(tuple(sorted((*parent.effects, e))))]
         screened = {effect: self._fitter.screening(parent, effect) for effect in effects}
         hopeful = sorted(effects, key=lambda effect: -screened[effect].gain)
         if most is not None:
             hopeful = hopeful[: _SCREENED * most]
         proposals = {effect: screened[effect].proposals() for effect in hopeful}
         ordered = sorted(hopeful, key=lambda effect: proposals[effect][0][0])[:most]
-        promising = [*ordered[:_PROMISING_PARTNERS], *like]
-        for partner in _partners(promising, set(effects) - set(ordered)):
+        for partner in _partners(ordered[:_PROMISING_PARTNERS], set(effects) - set(ordered)):
             proposals.setdefault(partner, screened[partner].proposals())
             ordered.append(partner)
         for number, effect in enumerate(ordered, 1):
             name = " + ".join((*parent.effects, effect))
-            if self._settled(tuple(sorted((*parent.effects, effect)))):
-                continue
             self._progress(f"{name} ({number} of {len(ordered)})")
             limit = _GIVE_UP * max(least, self._fitter.train.size)
             if most is not None:
@@ -227,20 +222,14 @@ class Search:
         return 2 if pairs and self._calls_for(best, pairs[0], SECOND_GAIN) else 1
 
     def _swap(self, best: Fit) -> None:
-        """Fit the best pair with each member replaced: by what promises most, and by its like.
-
-        A pair that leaves nothing is compared with its near equivalents alone.
-        """
+        """Fit the best pair with each member replaced by its near equivalents."""
         pairs = self._ranked(2)
         if not pairs or not self._calls_for(best, pairs[0], SECOND_GAIN):
             return
         for kept, swapped in (pairs[0].effects, pairs[0].effects[::-1]):
-            others = set(self._fitter.catalogue) - {kept, swapped}
-            if self.misfit(pairs[0]) < NOTHING_LEFT:
-                others &= set(_partners([swapped], others))
-            if others:
-                parent = self._fitter.without(pairs[0], swapped)
-                self._extend(parent, sorted(others), _SWAPPED, [swapped])
+            partners = _partners([swapped], set(self._fitter.catalogue) - {kept, swapped})
+            if partners:
+                self._extend(self._fitter.without(pairs[0], swapped), partners)
 
     def _settled(self, effects: tuple[str, ...]) -> bool:
         """Whether a fit of these effects has converged and another start could not help."""
