@@ -59,7 +59,7 @@ _PACES = {
 }
 _TIME = struct.Struct("<4xiI")  # with this begins the CDR of all three
 
-# What overruns the reader's socket, or its queue in shared memory, is repeated by DDS 3 s later.
+# What overruns the reader's socket, or its queue in shared memory, is repeated by DDS later.
 _BURST = 100
 _PAUSE_NS = 2_000_000
 

@@ -29,7 +29,7 @@ _POLL_S = 0.01
 _START_S = 90.0  # the very first start compiles the physics
 _ANSWER_S = 1.0
 _TRY_S = 10.0
-_STALL_S = 8.0  # a message that DDS must repeat comes after 3 s
+_STALL_S = 8.0  # Fast DDS by default repeats a message after 3 s
 _PREPARATION_S = 5e-6  # for each sample: the nodes make reference and noise before the first one
 
 

@@ -11,10 +11,6 @@ import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
-# Discovery stays on this machine unless the user's environment asks otherwise: a rehearsal must
-# not move hardware on the network. rclpy reads this when it starts.
-os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import SetParametersResult
@@ -32,6 +28,7 @@ from rclpy.subscription import Subscription
 from rclpy.timer import Timer
 from std_srvs.srv import Trigger
 
+from . import fast_dds
 from .errors import InputError
 from .health import Health
 from .parameters import Parameter, ParameterGroup
@@ -39,6 +36,11 @@ from .real_time import NEVER
 from .ros_messages import plain, to_descriptor, to_diagnostics
 from .stopping import Stopping
 from .topics import JOINT, NAMESPACE, SIGNAL_DEPTH
+
+# Discovery stays on this machine unless the user's environment asks otherwise: a rehearsal must
+# not move hardware on the network. Both are read by rclpy.init().
+os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+fast_dds.set_defaults(os.environ)
 
 SIGNAL_QOS = QoSProfile(
     history=HistoryPolicy.KEEP_LAST,

@@ -30,9 +30,6 @@ def own_domain() -> Iterator[int]:
                 lock.bind(f"\0fjr-rig-tests/ros-domain-{domain}")
             except OSError:
                 continue
-            for port in range(7400 + 250 * domain, 7650 + 250 * domain):
-                for left in Path("/dev/shm").glob(f"*fastrtps_port{port}*"):
-                    left.unlink(missing_ok=True)  # of a killed node, which might hold up the next
             yield domain
             return
     raise RuntimeError("every ROS domain is taken by other tests")

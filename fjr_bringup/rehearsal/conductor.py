@@ -31,7 +31,7 @@ _SHOW_S = 1.0
 _REST_S = 2.0
 _AFTER_S = 1.0  # for the last torque, and for a drive whose clock is slower
 _SLOWER = 1.01
-_REPEATED_S = 4.0  # a message that DDS must repeat comes after 3 s
+_REPEATED_S = 4.0  # Fast DDS by default repeats a message after 3 s
 _SILENCE_S = 8.0
 
 

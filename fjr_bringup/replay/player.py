@@ -33,7 +33,7 @@ _DISCOVERY_S = 1.0
 _PAUSE_S = 0.02
 _SAY_S = 3.0
 _LOOK_S = 0.1
-_LAST_S = 4.0  # at the end, for what DDS must repeat: it does so every 3 s
+_LAST_S = 4.0  # at the end, for what DDS must repeat: by default every 3 s
 _BURST = 50  # messages on one topic between two acknowledgements
 
 
@@ -68,7 +68,7 @@ class _Output:
     """One publisher and what has gone through it.
 
     Fast DDS asks its readers for an acknowledgement at once when the history is full, else only
-    every 3 s: so a publisher that is to be paced by them has a short history, and fills it.
+    with a heartbeat: so a publisher that is to be paced by them has a short history, and fills it.
     """
 
     def __init__(self, node: Node, topic: PlayedTopic, paced: bool) -> None:
