@@ -10,7 +10,8 @@ import numpy as np
 
 from .attribution import Attribution, Search
 from .confidence import confidence
-from .diagnosis import Candidate, Diagnosis, Estimate, Gap, Gaps, NextExperiment, Verdict
+from .diagnosis import Candidate, Diagnosis, Gap, Gaps, NextExperiment, Verdict
+from .estimates import estimates
 from .fits import Fit, Fitter
 from .gap_intervals import gap_figures
 from .gates import GateReport, bags_gate, check_gates
@@ -171,6 +172,7 @@ def _judge(
     verdict = _verdict(attribution, misfits, gates)
     named = list(best.effects) if verdict in ("effect", "ambiguous") else []
     shown = best if named or verdict == "parameters_only" else refit
+    groups = fitter.train.groups()
     diagnosis = Diagnosis(
         verdict=verdict,
         effects=named,
@@ -180,8 +182,8 @@ def _judge(
         gap_closed=_closed(gap["refit"], gap["explained"], floor) if best.effects else None,
         gap_figures=gap_figures(recorded, held, signals, closes=bool(best.effects)),
         where=maps["refit" if misfits["refit"] > NO_GAP else "nominal"].places(),
-        ranking=[_candidate(fit, size, refit) for fit in attribution.candidates],
-        parameters=_estimates(shown),
+        ranking=[_candidate(fit, size, refit, groups) for fit in attribution.candidates],
+        parameters=estimates(shown, groups),
         next_experiment=_next(recorded, noise, attribution, verdict),
         notes=_notes(gates, attribution, misfits, verdict),
     )
@@ -285,38 +287,15 @@ def _equivalents(attribution: Attribution) -> list[list[str]]:
     return sets
 
 
-def _candidate(fit: Fit, size: int, refit: Fit) -> Candidate:
-    estimates = _estimates(fit)
+def _candidate(fit: Fit, size: int, refit: Fit, groups: np.ndarray) -> Candidate:
+    found = estimates(fit, groups)
     return Candidate(
         effects=list(fit.effects),
         held_out_chi2=fit.held_chi2 / size if fit.converged else None,
         delta=refit.held_chi2 - fit.held_chi2 if fit.converged else None,
         converged=fit.converged,
-        parameters={name: estimates[name] for name in fit.space.effects},
+        parameters={name: found[name] for name in fit.space.effects},
     )
-
-
-def _estimates(fit: Fit) -> dict[str, Estimate]:
-    """Return all free parameters with 95 % intervals, widened by what the fit leaves.
-
-    The covariance is that of the Gauss-Newton approximation times the misfit per degree of freedom.
-    """
-    solution, space = fit.solution, fit.space
-    inflation = max(1.0, solution.cost / solution.residuals.size)
-    normal = solution.jacobian.T @ solution.jacobian
-    std = np.sqrt(inflation * np.abs(np.diag(np.linalg.pinv(normal, rcond=1e-14))))
-    low_bound, high_bound = space.bounds()
-    low = space.model(np.clip(solution.x - 1.96 * std, low_bound, high_bound))
-    high = space.model(np.clip(solution.x + 1.96 * std, low_bound, high_bound))
-    estimates = {
-        name: Estimate(value=fit.model.plant[name], low=low.plant[name], high=high.plant[name])
-        for name in space.nominal
-    }
-    for name in space.effects:
-        estimates[name] = Estimate(
-            value=fit.model.effects[name], low=low.effects[name], high=high.effects[name]
-        )
-    return estimates
 
 
 def _notes(

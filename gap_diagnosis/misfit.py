@@ -93,6 +93,13 @@ class Misfit:
         parts = np.concatenate([lines.real, lines[..., 1:].imag], axis=-1)
         return parts.reshape(len(lines), -1)
 
+    def groups(self, bands: int = 4) -> np.ndarray:
+        """Return for each error which band of which realization it belongs to, int (errors,)."""
+        line = np.concatenate([np.arange(self._lines), np.arange(1, self._lines)])
+        outputs = self.measured.shape[1]
+        band = np.tile(line * bands // self._lines, outputs)
+        return (np.arange(len(self.which))[:, None] * bands + band).ravel()
+
     def chi2(self, model: Model) -> float:
         """Return the chi-square of one model, per degree of freedom."""
         return float(np.sum(self.errors([model])[0] ** 2)) / self.size

@@ -1,0 +1,52 @@
+"""Standard errors of fits whose law is right, and of fits whose law is not quite right."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gap_diagnosis.estimates import standard_errors
+
+LINES, GROUPS = 600, 12
+AT = np.linspace(0.0, 1.0, LINES)
+GROUP = np.arange(LINES) * GROUPS // LINES
+JACOBIAN = 30.0 * np.stack([np.ones(LINES), AT], axis=1)
+RUNS = 400
+
+
+def coverage(law: np.ndarray, seed: int) -> np.ndarray:
+    """Return how often 1.96 standard errors hold the truth, zero, when the data hold a law too."""
+    rng = np.random.default_rng(seed)
+    inside = np.zeros(2)
+    for _ in range(RUNS):
+        data = rng.standard_normal(LINES) + law * rng.standard_normal()
+        x = np.linalg.lstsq(JACOBIAN, data, rcond=None)[0]
+        std = standard_errors(JACOBIAN, JACOBIAN @ x - data, GROUP)
+        inside += np.abs(x) < 1.96 * std
+    return inside / RUNS
+
+
+def test_intervals_of_a_right_law_hold_the_truth_as_often_as_they_say():
+    assert (coverage(np.zeros(LINES), 1) >= 0.93).all()
+    assert (coverage(np.zeros(LINES), 1) <= 0.995).all()
+
+
+def test_intervals_widen_where_neighbouring_lines_err_alike():
+    law = 2.0 * np.sin(2.0 * np.pi * 1.3 * AT + 0.4)
+    assert (coverage(law, 2) >= 0.85).all()
+    rng = np.random.default_rng(3)
+    noise = rng.standard_normal(LINES)
+    left = noise - JACOBIAN @ np.linalg.lstsq(JACOBIAN, noise, rcond=None)[0]
+    alike = left + law - JACOBIAN @ np.linalg.lstsq(JACOBIAN, law, rcond=None)[0]
+    shuffled = rng.permutation(alike)
+    together = standard_errors(JACOBIAN, alike, GROUP)
+    assert (together > 1.5 * standard_errors(JACOBIAN, shuffled, GROUP)).all()
+
+
+def test_a_parameter_that_one_group_alone_tells_is_not_called_certain():
+    jacobian = np.stack([np.ones(LINES), (GROUP == 3).astype(float)], axis=1)
+    residuals = np.random.default_rng(4).standard_normal(LINES)
+    residuals -= jacobian @ np.linalg.lstsq(jacobian, residuals, rcond=None)[0]
+    std = standard_errors(jacobian, residuals, GROUP)
+    assert np.isfinite(std).all()
+    assert std[1] >= 0.9 * np.sqrt(1.0 / np.count_nonzero(GROUP == 3)) == pytest.approx(0.127, 0.01)
