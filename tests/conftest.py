@@ -8,10 +8,15 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import settings
 from ros_domain import Peer, Starter, marked_processes, own_domain, wait_for
 from typer.testing import CliRunner
 
 from fjr_bringup.cli import app
+
+# A machine that others share, or a kernel that compiles at its first call, is no fault of a test.
+settings.register_profile("untimed", deadline=None)
+settings.load_profile("untimed")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

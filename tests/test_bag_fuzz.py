@@ -22,7 +22,6 @@ from fjr_interface.mcap_blocks import MAX_RECORD, read_blocks
 
 MANY = settings(
     max_examples=150,
-    deadline=None,
     derandomize=True,
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )

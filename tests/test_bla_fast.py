@@ -150,7 +150,7 @@ def test_few_detection_lines_give_few_degrees_of_freedom():
 SIGNALS = simulate(3)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(shift=st.integers(0, 127), torque=st.floats(1e-3, 1e3), position=st.floats(1e-3, 1e3))
 def test_invariance_under_shift_and_scale(shift, torque, position):
     before = fast_bla(loop.spectra(SIGNALS, GRID.last)[0], GRID)

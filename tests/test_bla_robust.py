@@ -183,7 +183,7 @@ def test_radius_quantile_is_that_of_the_f_distribution():
 SIGNALS = simulate(count=4)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     shift=st.integers(0, 127),
     torque=st.floats(1e-3, 1e3),

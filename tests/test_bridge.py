@@ -35,7 +35,7 @@ NAN = math.nan
     st.data(),
     st.integers(0, 2**31 * 10**9 - 1),
 )
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_the_effort_of_a_joint_is_found_in_any_order(names, data, stamp):
     efforts = data.draw(st.lists(st.floats(), min_size=len(names), max_size=len(names)))
     positions = [1.0] * data.draw(st.sampled_from([0, len(names)]))
@@ -107,7 +107,7 @@ def steady(samples: int, delay: float = 0.3) -> list[tuple[str, float, float]]:
 
 
 @given(st.integers(0, 10**6), st.floats(0.05, 0.5), st.floats(0.0, 0.1), st.floats(-1e-4, 1e-4))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_states_and_commands_are_paired_whatever_their_jitter_and_delay(seed, delay, jitter, drift):
     rng = np.random.default_rng(seed)
     times = 1e6 + (1.0 + drift) * np.arange(300) + jitter * rng.uniform(-1.0, 1.0, 300)

@@ -99,7 +99,7 @@ def test_all_effects_at_once_run():
 sizes = st.floats(-1.0, 1.0).map(lambda x: 10.0**x)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(
     identifiers=st.lists(st.sampled_from(sorted(PASSIVE)), min_size=1, max_size=3, unique=True),
     scale=sizes,
@@ -229,7 +229,7 @@ def absurd_values(draw) -> dict[str, float]:
     }
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(values=absurd_values(), frictionless=st.booleans())
 def test_absurd_parameters_end_in_motion_or_one_sentence(values, frictionless):
     bare = {"fs": 0.0, "fsm": 0.0, "fv": 0.0, "fvm": 0.0} if frictionless else {}

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from effect_rig import MODERATE, named, relative_rms
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
@@ -71,7 +71,6 @@ def test_a_bad_effect_in_a_parameter_file_is_one_sentence(text, tmp_path):
     assert "\n" not in str(caught.value)
 
 
-@settings(deadline=None)
 @given(st.data())
 def test_every_effect_survives_saving_and_loading(tmp_path_factory, data):
     values = {}

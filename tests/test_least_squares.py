@@ -35,7 +35,7 @@ def test_the_valley_leads_to_its_minimum(start):
 
 
 @given(st.tuples(st.floats(-5.0, 5.0), st.floats(-5.0, 5.0)), st.integers(0, 5))
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 def test_no_fit_is_worse_than_its_start(start, steps):
     before = float(np.sum(rosenbrock(np.array([start]))[0] ** 2))
     assert solve(rosenbrock, np.array(start), *FREE, most_steps=steps).cost <= before

@@ -65,7 +65,7 @@ def write(folder, streams: dict[str, tuple[np.ndarray, np.ndarray]], **options):
 
 
 @given(st.integers(0, 10**6), st.floats(0.0, 0.24), st.floats(0.0, 0.02), st.floats(-1e-4, 1e-4))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_every_sample_gets_its_number_whatever_jitter_and_loss(seed, jitter, loss, drift):
     rng = np.random.default_rng(seed)
     kept = np.flatnonzero(rng.random(3000) >= loss)
@@ -137,7 +137,7 @@ def test_the_true_error_is_within_the_stated_one_in_95_percent(errors):
 
 
 @given(st.integers(0, 10**6), st.floats(0.0, 1.0), st.floats(0.01, 0.4))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_commands_of_a_shifted_clock_are_delayed_and_nothing_else(seed, shift, frequency):
     assert 2.0 * frequency < BAND
     time, points = np.arange(300) + shift, np.arange(40.0, 260.0)

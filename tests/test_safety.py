@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from controller_node import pd_filtered
@@ -37,7 +37,6 @@ def law(*, real_time: bool = False, **given: Any) -> GuardedLaw:
 signals = st.lists(st.tuples(st.floats(-0.05, 0.05), st.floats(-0.05, 0.05)), max_size=60)
 
 
-@settings(deadline=None)  # the first one compiles the law
 @given(signals, st.floats(0.1, 100.0))
 def test_in_lockstep_the_default_torque_is_the_bare_laws_bit_by_bit(samples, limit):
     guarded = law(torque_limit_nm=limit)
