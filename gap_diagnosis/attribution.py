@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from .fits import Fit, Fitter
-from .shape_scan import RIPPLES
+from .ripples import RIPPLES
 
 CERTAIN = 60.0
 """Least fall of the held-out chi-square that an effect must bring, whatever its share."""

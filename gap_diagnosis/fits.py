@@ -14,15 +14,16 @@ from .least_squares import Solution, solve
 from .misfit import Misfit
 from .model import LINK_EFFECTS, Model, Simulator
 from .records import RecordedExperiment
+from .ripples import RIPPLES, best_cycles, best_harmonics
 from .screening import Proposal, Screening
 from .search_space import STARTS, TOLERANCE, Space, space_for, starts
-from .shape_scan import RIPPLES, SCANNED, TRIED, best_harmonics, best_shapes
 
 _KEPT_STARTS = 2
 _MOST_STEPS = 40
 _MORE_STEPS = 160  # along a valley in which sizes and parameters nearly replace each other
 _NESTED_STEPS = 3
 _FIRST_STEPS = 6
+_RIPPLES_TRIED = 4
 _WORTH_A_HARMONIC = 0.9
 _RIVAL = 1.5  # a second start that stays this far above the first is not pursued
 _NO_PROMISE = 0.998  # of the parent's chi-square: a start that gains less is not pursued far
@@ -162,16 +163,16 @@ class Fitter:
 
     def screening(self, parent: Fit, effect: str) -> Screening:
         """Return what the starts of an effect promise beside a fit."""
-        shapes = {}
-        if effect in SCANNED and self._recorded.repeatable:
-            shapes[SCANNED[effect][0]] = best_shapes(
+        cycles = None
+        if effect in RIPPLES and self._recorded.repeatable:
+            cycles = best_cycles(
                 effect, self._recorded, self._simulator, self.train,
-                parent.model, parent.solution, TRIED[effect],
+                parent.model, parent.solution, _RIPPLES_TRIED,
             )  # fmt: skip
         return Screening(
             parent.solution,
             parent.model,
-            starts(effect, self.peak_torque_nm, shapes),
+            starts(effect, self.peak_torque_nm, cycles),
             partial(self._space, parent),
             self._errors,
         )
@@ -267,7 +268,7 @@ class Fitter:
         names = (size, *shape, f"{effect}.second_ratio", f"{effect}.second_phase_rad")
         promising = best_harmonics(
             effect, self._recorded, self._simulator, self.train,
-            rest.model, rest.solution, TRIED[effect],
+            rest.model, rest.solution, _RIPPLES_TRIED,
         )  # fmt: skip
         found = []
         for values in promising:

@@ -18,7 +18,10 @@ TOLERANCE = 0.1
 is off scales all values."""
 
 _CYCLES = (1.0, 2.0, 4.0, 8.0, 16.0, 24.0, 36.0, 52.0, 72.0, 96.0, 120.0)
-"""Ripples per turn to try where the loop cannot be repeated; else `shape_scan` finds better."""
+"""Ripples per turn to try where the loop cannot be repeated; else `ripples` finds better."""
+
+_MODES_HZ = tuple(np.geomspace(4.0, 100.0, 44).tolist())
+"""Frequencies of a light third mass, which shows in a band as narrow as its damping."""
 
 _SHARES = (0.15, 0.25, 0.4, 0.5, 0.6, 0.7, 0.75, 0.8, 0.85, 0.9, 0.94, 0.97, 1.0, 1.04, 1.1)
 """Torque limits over the greatest commanded torque: which peaks are clipped changes from one to
@@ -60,8 +63,9 @@ STARTS: dict[str, tuple[dict[str, tuple[float, ...]], ...]] = {
         },
     ),
     "extra_mode": (
+        {"inertia_kg_m2": (1e-3,), "frequency_hz": _MODES_HZ, "damping_ratio": (0.03,)},
         {
-            "inertia_kg_m2": (1e-3, 2e-2),
+            "inertia_kg_m2": (2e-2,),
             "frequency_hz": (8.0, 15.0, 22.0, 30.0, 40.0, 55.0),
             "damping_ratio": (0.03,),
         },
@@ -108,7 +112,7 @@ NEGLIGIBLE: dict[str, float] = {
 
 
 def starts(
-    effect: str, peak_torque_nm: float, shapes: Mapping[str, Sequence[float]] | None = None
+    effect: str, peak_torque_nm: float, cycles: Sequence[float] | None = None
 ) -> list[dict[str, float]]:
     """Return the starting points of an effect by full parameter name.
 
@@ -116,13 +120,14 @@ def starts(
         effect: identifier.
         peak_torque_nm: greatest torque of the record; a drive that saturates does so below it,
             and far below where the loop then asks for more.
-        shapes: values of a shape parameter that promise more than the coarse grid, by its name.
+        cycles: ripples per turn of an angle-periodic effect; None for a coarse grid.
     """
     points = []
     for grid in STARTS[effect]:
         if effect == "torque_saturation":
             grid = {**grid, "limit_nm": tuple(s * peak_torque_nm for s in grid["limit_nm"])}
-        grid = {**grid, **{n: tuple(v) for n, v in (shapes or {}).items() if n in grid}}
+        if cycles is not None and "cycles_per_turn" in grid:
+            grid = {**grid, "cycles_per_turn": tuple(cycles)}
         for values in itertools.product(*grid.values()):
             names = (f"{effect}.{name}" for name in grid)
             points.append(dict(zip(names, values, strict=True)))

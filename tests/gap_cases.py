@@ -14,11 +14,15 @@ from excitation_node import multisine
 from fjr_interface.bag_writer import BagWriter
 from fjr_sim_node.plant import PLANT
 from fjr_sim_node.simulator import SIMULATOR, run_realization
-from gap_diagnosis.model import Model
+from gap_diagnosis.fits import Fitter
+from gap_diagnosis.model import Model, Simulator
+from gap_diagnosis.noise import noise_levels
 from gap_diagnosis.records import Realization, RecordedExperiment
 
 LEVELS_RAD = (2e-3, 7e-3, 2e-2)
 NOISE_RAD = 2e-5
+SHORT = {"base_frequency_hz": 0.5, "levels_rad": (5e-3, 2e-2), "transient_periods": 2}
+"""Arguments of `simulate_case` for a case that is quickly fitted."""
 
 
 @dataclass(frozen=True)
@@ -118,3 +122,11 @@ def write_bags(case: Case, folder: Path) -> Path:
                 u=realization.torque.ravel(),
             )
     return folder
+
+
+def fitter_of(case: Case) -> tuple[RecordedExperiment, Simulator, Fitter]:
+    """Return what fits a case of two levels of two realizations from the paper's values."""
+    recorded, simulator = case.recorded, Simulator(case.recorded)
+    noise = noise_levels(recorded).of_outputs(recorded)
+    nominal = Model.nominal(PLANT.defaults()).plant
+    return recorded, simulator, Fitter(recorded, simulator, noise, nominal, (0, 2), (1, 3))

@@ -16,8 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from ..diagnosis import Candidate, Diagnosis, Estimate, Gaps, Verdict
+from ..ripples import RIPPLES
 from ..search_space import STARTS, starts
-from ..shape_scan import RIPPLES
 from .baseline_fit import Problem, fit, jacobian
 
 _UNDETECTED = 1.5  # chi2 per equation below which there is nothing left to explain
@@ -79,8 +79,8 @@ def _features(refit: _Refit, basis: np.ndarray) -> list[tuple[str, dict[str, flo
     """Return (effect, values, change of the residual beyond any refit) of every starting point."""
     found = []
     for effect in STARTS:
-        shapes = {"cycles_per_turn": _CYCLES} if effect in RIPPLES else None
-        for point in starts(effect, refit.problem.peak_torque_nm, shapes):
+        cycles = _CYCLES if effect in RIPPLES else None
+        for point in starts(effect, refit.problem.peak_torque_nm, cycles):
             residual = refit.problem.residual({**refit.values, **point})
             if np.isfinite(residual).all():
                 found.append((effect, point, _projected(basis, residual - refit.residual)))

@@ -1,9 +1,9 @@
-"""Which ripples or third masses could explain what a model leaves: hundreds of shapes at once.
+"""Which ripples over the motor angle could explain what a model leaves: hundreds at once.
 
-A ripple over the motor angle acts as a torque on the motor, a third mass as one on the link. What
-it does to the position is predicted linearly: the torque along the model's own motion, times the
-response of the closed loop to a torque, Y/(R C) = G/(1 + G C), which the model's simulation gives
-at the excited lines. Only the best go on to be simulated, so that this may be rough.
+A ripple acts as a torque on the motor. What it does to the position is predicted linearly: the
+torque along the model's own motion, times the response of the closed loop to a torque,
+Y/(R C) = G/(1 + G C), which the model's simulation gives at the excited lines. Only the best go on
+to be simulated, so that this may be rough.
 """
 
 from __future__ import annotations
@@ -26,17 +26,6 @@ RIPPLES = ("position_friction", "kinematic_error", "cogging")
 """Effects that are periodic in the motor angle."""
 CYCLES = np.concatenate([np.arange(0.5, 4.0, 0.25), np.arange(4.0, 40.0, 0.5), np.arange(40, 231)])
 """Numbers of ripples per turn that are looked at; between them the response hardly changes."""
-MODES_HZ = np.geomspace(4.0, 110.0, 140)
-"""Frequencies of a third mass that are looked at, closer than its damping ratio makes it wide."""
-SCANNED: dict[str, tuple[str, np.ndarray]] = {
-    **dict.fromkeys(RIPPLES, ("cycles_per_turn", CYCLES)),
-    "extra_mode": ("frequency_hz", MODES_HZ),
-}
-"""The parameter that gives an effect its shape, and the values of it that are looked at."""
-TRIED = {**dict.fromkeys(RIPPLES, 4), "extra_mode": 10}
-"""How many of them are worth a simulation; a narrow band is predicted less well than a ripple."""
-
-_DAMPING_RATIO = 0.03
 
 
 @dataclass(frozen=True)
@@ -45,24 +34,18 @@ class _Motion:
 
     Attributes:
         motor, velocity, transmitted: rad, rad/s, N m.
-        link: rad.
-        frequency: of the lines, imaginary, s = j omega (rad/s), (lines,).
         response: complex (realizations, lines), position per torque on the motor, rad/(N m).
-        of_link: the same of a torque on the link.
         both: the same of a torque between link and motor.
     """
 
     motor: np.ndarray
     velocity: np.ndarray
     transmitted: np.ndarray
-    link: np.ndarray
-    frequency: np.ndarray
     response: np.ndarray
-    of_link: np.ndarray
     both: np.ndarray
 
 
-def best_shapes(
+def best_cycles(
     effect: str,
     recorded: RecordedExperiment,
     simulator: Simulator,
@@ -71,10 +54,10 @@ def best_shapes(
     parent: Solution,
     most: int,
 ) -> list[float]:
-    """Return the values of an effect's shape parameter that promise most, best first.
+    """Return the numbers of cycles per turn that promise most, best first.
 
     Args:
-        effect: one of SCANNED.
+        effect: one of RIPPLES.
         recorded: the experiment; its loop can be repeated.
         simulator: repeats it.
         misfit: of the realizations that count.
@@ -85,10 +68,9 @@ def best_shapes(
     motion = _motion(recorded, simulator, misfit, model)
     basis = np.linalg.qr(parent.jacobian)[0]
     left = parent.residuals - basis @ (basis.T @ parent.residuals)
-    values = SCANNED[effect][1]
-    changes = (_changes(effect, value, motion, model.plant) for value in values.tolist())
+    changes = (_of_ripple(effect, cycles, motion, model.plant) for cycles in CYCLES.tolist())
     gains = np.array([_lowered(misfit.errors_of(change), basis, left) for change in changes])
-    return [float(values[i]) for i in _peaks(gains)[:most]]
+    return [float(CYCLES[i]) for i in _peaks(gains)[:most]]
 
 
 def best_harmonics(
@@ -102,7 +84,7 @@ def best_harmonics(
 ) -> list[tuple[float, float, float, float, float]]:
     """Return the ripples with a second harmonic that promise most, best first.
 
-    Args: as of `best_shapes`, for one of RIPPLES.
+    Args: as of `best_cycles`, for one of RIPPLES.
 
     Returns:
         (size, cycles per turn, phase (rad), second harmonic over the first, its phase (rad)), at
@@ -154,10 +136,7 @@ def _motion(
         motor=y,
         velocity=np.gradient(y, axis=1) * description.sample_rate_hz,
         transmitted=p.get("k0", 0.0) * twist,
-        link=q,
-        frequency=s,
         response=response,
-        of_link=response * (1.0 - _of_pair(p, s)),
         both=response * _of_pair(p, s),
     )
 
@@ -174,21 +153,6 @@ def _between(lines: np.ndarray, known: np.ndarray, values: np.ndarray) -> np.nda
     """Interpolate a response in magnitude and phase."""
     size = np.interp(lines, known, np.log(np.abs(values)))
     return np.exp(size + 1j * np.interp(lines, known, np.unwrap(np.angle(values))))
-
-
-def _changes(effect: str, value: float, motion: _Motion, plant: Mapping[str, float]) -> np.ndarray:
-    """Return how the lines of y change, by each unknown size: complex (n, realizations, lines)."""
-    if effect == "extra_mode":
-        return _of_third_mass(value, motion)[None]
-    return _of_ripple(effect, value, motion, plant)
-
-
-def _of_third_mass(frequency_hz: float, motion: _Motion) -> np.ndarray:
-    """Return the change by a third mass of 1 kg m^2 behind a spring on the link, not felt by it."""
-    s, omega = motion.frequency, 2.0 * np.pi * frequency_hz
-    spring = omega**2 + 2.0 * _DAMPING_RATIO * omega * s
-    torque = -(s**2) * spring / (s**2 + spring)
-    return spectrum(motion.link, s.size) * torque * motion.of_link
 
 
 def _of_ripple(
@@ -210,9 +174,7 @@ def _of_ripple(
 
 
 def _lowered(columns: np.ndarray, basis: np.ndarray, left: np.ndarray) -> float:
-    """Return how far the best sizes would lower the chi-square; a lone size is positive."""
+    """Return how far the best sizes would lower the chi-square."""
     own = columns - (columns @ basis) @ basis.T
     weights = np.linalg.lstsq(own.T, -left, rcond=1e-9)[0]
-    if weights.size == 1 and weights[0] < 0.0:
-        return 0.0
     return -float(weights @ (own @ left))
