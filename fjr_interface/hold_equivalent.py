@@ -32,10 +32,8 @@ def _kernel(x: np.ndarray) -> np.ndarray:
 
 def _integral() -> tuple[np.ndarray, np.ndarray]:
     """Return x and A(x) in steps fine enough for linear interpolation (1e-7)."""
-    x = np.arange(-(REACH + 1) * _STEPS, (REACH + 1) * _STEPS + 1) / _STEPS
-    table = np.zeros(len(x))
-    for m in range(2 * REACH + 2):
-        table += _kernel(x - 0.5 - m)
+    x = np.arange(-(REACH + 1) * _STEPS, (REACH + 1) * _STEPS) / _STEPS
+    table = np.cumsum(_kernel(x - 0.5).reshape(-1, _STEPS), axis=0).ravel()
     return x, table
 
 
