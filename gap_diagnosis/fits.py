@@ -14,7 +14,7 @@ from .least_squares import Solution, solve
 from .misfit import Misfit
 from .model import LINK_EFFECTS, Model, Simulator
 from .records import RecordedExperiment
-from .ripples import RIPPLES, best_cycles, best_harmonics
+from .ripples import RIPPLES, RippleSearch
 from .screening import Proposal, Screening
 from .search_space import STARTS, TOLERANCE, Space, space_for, starts
 
@@ -165,16 +165,18 @@ class Fitter:
         """Return what the starts of an effect promise beside a fit."""
         cycles = None
         if effect in RIPPLES and self._recorded.repeatable:
-            cycles = best_cycles(
-                effect, self._recorded, self._simulator, self.train,
-                parent.model, parent.solution, _RIPPLES_TRIED,
-            )  # fmt: skip
+            cycles = self._ripples(effect, parent).cycles(_RIPPLES_TRIED)
         return Screening(
             parent.solution,
             parent.model,
             starts(effect, self.peak_torque_nm, cycles),
             partial(self._space, parent),
             self._errors,
+        )
+
+    def _ripples(self, effect: str, parent: Fit) -> RippleSearch:
+        return RippleSearch(
+            effect, self._recorded, self._simulator, self.train, parent.model, parent.solution
         )
 
     def _space(self, parent: Fit, seed: Mapping[str, float]) -> Space:
@@ -266,12 +268,8 @@ class Fitter:
         rest = self.without(fit, effect)
         size, *shape = (name for name in fit.space.effects if name.startswith(f"{effect}."))
         names = (size, *shape, f"{effect}.second_ratio", f"{effect}.second_phase_rad")
-        promising = best_harmonics(
-            effect, self._recorded, self._simulator, self.train,
-            rest.model, rest.solution, _RIPPLES_TRIED,
-        )  # fmt: skip
         found = []
-        for values in promising:
+        for values in self._ripples(effect, rest).harmonics(_RIPPLES_TRIED):
             for share in (1.0, 0.4):
                 seed = dict(zip(names, (share * values[0], *values[1:]), strict=True))
                 space = self._space(rest, seed)

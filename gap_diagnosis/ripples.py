@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -45,68 +45,69 @@ class _Motion:
     both: np.ndarray
 
 
-def best_cycles(
-    effect: str,
-    recorded: RecordedExperiment,
-    simulator: Simulator,
-    misfit: Misfit,
-    model: Model,
-    parent: Solution,
-    most: int,
-) -> list[float]:
-    """Return the numbers of cycles per turn that promise most, best first.
+class RippleSearch:
+    """What ripples of one effect could do about the errors that a fit leaves."""
 
-    Args:
-        effect: one of RIPPLES.
-        recorded: the experiment; its loop can be repeated.
-        simulator: repeats it.
-        misfit: of the realizations that count.
-        model: the parent's model.
-        parent: where the parent's fit ended.
-        most: how many to return, each a maximum of its own.
-    """
-    motion = _motion(recorded, simulator, misfit, model)
-    basis = np.linalg.qr(parent.jacobian)[0]
-    left = parent.residuals - basis @ (basis.T @ parent.residuals)
-    changes = (_of_ripple(effect, cycles, motion, model.plant) for cycles in CYCLES.tolist())
-    gains = np.array([_lowered(misfit.errors_of(change), basis, left) for change in changes])
-    return [float(CYCLES[i]) for i in _peaks(gains)[:most]]
+    def __init__(
+        self,
+        effect: str,
+        recorded: RecordedExperiment,
+        simulator: Simulator,
+        misfit: Misfit,
+        model: Model,
+        parent: Solution,
+    ) -> None:
+        """Simulate the model's motion once.
 
+        Args:
+            effect: one of RIPPLES.
+            recorded: the experiment; its loop can be repeated.
+            simulator: repeats it.
+            misfit: of the realizations that count.
+            model: the parent's model.
+            parent: where the parent's fit ended.
+        """
+        self._effect, self._misfit, self._plant = effect, misfit, model.plant
+        self._motion = _motion(recorded, simulator, misfit, model)
+        self._basis = np.linalg.qr(parent.jacobian)[0]
+        self._left = self._beyond(parent.residuals)
 
-def best_harmonics(
-    effect: str,
-    recorded: RecordedExperiment,
-    simulator: Simulator,
-    misfit: Misfit,
-    model: Model,
-    parent: Solution,
-    most: int,
-) -> list[tuple[float, float, float, float, float]]:
-    """Return the ripples with a second harmonic that promise most, best first.
+    def cycles(self, most: int) -> list[float]:
+        """Return the numbers of cycles per turn that promise most, best first.
 
-    Args: as of `best_cycles`, for one of RIPPLES.
+        Args:
+            most: how many to return, each a maximum of its own.
+        """
+        gains = np.array([self._best_sizes((cycles,))[1] for cycles in CYCLES.tolist()])
+        return [float(CYCLES[i]) for i in _peaks(gains)[:most]]
 
-    Returns:
-        (size, cycles per turn, phase (rad), second harmonic over the first, its phase (rad)), at
-        the most `most`.
-    """
-    motion = _motion(recorded, simulator, misfit, model)
-    basis = np.linalg.qr(parent.jacobian)[0]
-    left = parent.residuals - basis @ (basis.T @ parent.residuals)
-    gains, weights = [], []
-    for cycles in CYCLES.tolist():
-        harmonics = [_of_ripple(effect, n * cycles, motion, model.plant) for n in (1, 2)]
-        columns = misfit.errors_of(np.concatenate(harmonics))
-        own = columns - (columns @ basis) @ basis.T
-        weights.append(np.linalg.lstsq(own.T, -left, rcond=1e-6)[0])
-        gains.append(-float(weights[-1] @ (own @ left)))
-    found = []
-    for i in _peaks(np.array(gains))[:most]:
-        first, second = complex(*weights[i][:2]), complex(*weights[i][2:])
-        phase, size = cmath.phase(first), max(abs(first), 0.1 * abs(second))
-        bend = math.remainder(cmath.phase(second) - 2.0 * phase, 2.0 * math.pi)
-        found.append((size, float(CYCLES[i]), phase, abs(second) / size, bend))
-    return found
+    def harmonics(self, most: int) -> list[tuple[float, float, float, float, float]]:
+        """Return the ripples with a second harmonic that promise most, best first.
+
+        Returns:
+            (size, cycles per turn, phase (rad), second harmonic over the first, its phase (rad)),
+            at the most `most`.
+        """
+        tried = [self._best_sizes((cycles, 2.0 * cycles)) for cycles in CYCLES.tolist()]
+        found = []
+        for i in _peaks(np.array([gain for _, gain in tried]))[:most]:
+            weights = tried[i][0]
+            first, second = complex(*weights[:2]), complex(*weights[2:])
+            phase, size = cmath.phase(first), max(abs(first), 0.1 * abs(second))
+            bend = math.remainder(cmath.phase(second) - 2.0 * phase, 2.0 * math.pi)
+            found.append((size, float(CYCLES[i]), phase, abs(second) / size, bend))
+        return found
+
+    def _best_sizes(self, cycles: Sequence[float]) -> tuple[np.ndarray, float]:
+        """Return sizes of sine and cosine of each number of cycles, and the chi-square's fall."""
+        changes = [_of_ripple(self._effect, n, self._motion, self._plant) for n in cycles]
+        own = self._beyond(self._misfit.errors_of(np.concatenate(changes)))
+        weights = np.linalg.lstsq(own.T, -self._left, rcond=1e-6)[0]
+        return weights, -float(weights @ (own @ self._left))
+
+    def _beyond(self, errors: np.ndarray) -> np.ndarray:
+        """Return what the parent's parameters can't follow of error vectors (..., errors)."""
+        return errors - (errors @ self._basis) @ self._basis.T
 
 
 def _peaks(gains: np.ndarray) -> np.ndarray:
@@ -171,10 +172,3 @@ def _of_ripple(
         changes = spectrum(plant["k0"] * turns, lines) * motion.both
         changes -= spectrum(slopes * motion.transmitted, lines) * motion.response
     return changes
-
-
-def _lowered(columns: np.ndarray, basis: np.ndarray, left: np.ndarray) -> float:
-    """Return how far the best sizes would lower the chi-square."""
-    own = columns - (columns @ basis) @ basis.T
-    weights = np.linalg.lstsq(own.T, -left, rcond=1e-9)[0]
-    return -float(weights @ (own @ left))

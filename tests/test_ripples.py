@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from gap_cases import SHORT, fitter_of, simulate_case
 
-from gap_diagnosis.ripples import CYCLES, RIPPLES, best_cycles
+from gap_diagnosis.ripples import CYCLES, RIPPLES, RippleSearch
 
 SIZES = {"position_friction": "amplitude_nm", "kinematic_error": "amplitude_rad",
          "cogging": "amplitude_nm"}  # fmt: skip
@@ -26,9 +26,9 @@ def test_ripples_are_proposed_near_enough_for_the_fit_to_find_them(effect, size,
     case = simulate_case(ripple(effect, size, cycles), seed=3, **SHORT)
     recorded, simulator, fitter = fitter_of(case)
     refit = fitter.refit()
-    proposed = best_cycles(
-        effect, recorded, simulator, fitter.train, refit.model, refit.solution, most=4
-    )
+    proposed = RippleSearch(
+        effect, recorded, simulator, fitter.train, refit.model, refit.solution
+    ).cycles(most=4)
     assert len(proposed) <= 4
     assert min(abs(np.array(proposed) - cycles)) <= off
     fit = fitter.add(refit, effect, fitter.screening(refit, effect).proposals())
