@@ -5,7 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gap_diagnosis.estimates import standard_errors
+from gap_diagnosis.blind.calibrate import widening
+from gap_diagnosis.blind.cases import NOMINAL, Answer, Effect
+from gap_diagnosis.blind.outcome import Outcome
+from gap_diagnosis.diagnosis import Diagnosis, Estimate, Gaps
+from gap_diagnosis.estimates import WIDENING, standard_errors
 
 LINES, GROUPS = 600, 12
 AT = np.linspace(0.0, 1.0, LINES)
@@ -50,3 +54,32 @@ def test_a_parameter_that_one_group_alone_tells_is_not_called_certain():
     std = standard_errors(jacobian, residuals, GROUP)
     assert np.isfinite(std).all()
     assert std[1] >= 0.9 * np.sqrt(1.0 / np.count_nonzero(GROUP == 3)) == pytest.approx(0.127, 0.01)
+
+
+def said(count: int, *offs: float) -> Outcome:
+    """Return a right verdict of so many effects, its first parameters that many standard errors off."""
+    names = ("delay", "backlash")[:count]
+    true = [Effect(name, 1.0, 1.0, 1.0, {}) for name in names]
+    parameters = {
+        name: Estimate(value=NOMINAL[name] - off, low=NOMINAL[name] - off - WIDENING[count],
+                       high=NOMINAL[name] - off + WIDENING[count])
+        for name, off in zip(NOMINAL, offs, strict=False)
+    }  # fmt: skip
+    kind = ("parameters", "single", "two")[count]
+    diagnosis = Diagnosis(
+        verdict="effect" if count else "parameters_only", effects=list(names), confidence=0.9,
+        equivalent=[[name] for name in names], parameters=parameters,
+        gap=Gaps(nominal=None, refit=None, explained=None, noise_floor=None),
+    )  # fmt: skip
+    return Outcome("case_000", "fjr", Answer(kind, true, NOMINAL, 0.0), diagnosis, "", 1.0)
+
+
+def test_blind_cases_tell_by_how_much_intervals_must_be_widened():
+    rng = np.random.default_rng(5)
+    sizes = (0.3, 0.8, 2.0)
+    cases = [said(n, *size * rng.standard_normal(8)) for n, size in enumerate(sizes)
+             for _ in range(100)]  # fmt: skip
+    none, one, two = widening(cases)
+    assert none == 1.0  # never narrower than the theory says
+    assert one == pytest.approx(0.8 * 1.96, rel=0.1) and two == pytest.approx(2.0 * 1.96, rel=0.1)
+    assert widening([]) == pytest.approx(WIDENING)

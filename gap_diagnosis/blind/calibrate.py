@@ -1,12 +1,12 @@
-"""Calibrates the confidence: `python -m gap_diagnosis.blind.calibrate FOLDER...`.
+"""Calibrates confidence and intervals: `python -m gap_diagnosis.blind.calibrate FOLDER...`.
 
 Each folder is a finished blind check of the method `fjr` whose seed is for training only, such as
 
     fjr blind run --cases 60 --seed 100 --method fjr --out training/100
 
-It prints the table for `gap_diagnosis.confidence` with what it rests on. Each group has a logistic
-regression with a Gaussian prior, so that few misses do not make a verdict certain; the expected
-calibration error is that of leaving each case out in turn.
+It prints the tables for `gap_diagnosis.confidence` and `gap_diagnosis.estimates` with what they rest
+on. Each group of verdicts has a logistic regression with a Gaussian prior, so that few misses do
+not make one certain; the expected calibration error is that of leaving each case out in turn.
 """
 
 from __future__ import annotations
@@ -20,27 +20,28 @@ from scipy.optimize import minimize
 
 from ..confidence import COEFFICIENTS, NAMES, Group, features, group
 from ..diagnosis import Diagnosis
+from ..estimates import WIDENING
 from .outcome import Outcome
 from .run import BlindCheck
 from .score import calibration_error
 
 _MEAN, _STD = 2.0, 1.5  # prior of the intercept: 88 % right
 _SLOPE_STD = 1.0
+_COVERAGE = 0.95
 
 Case = tuple[Diagnosis, bool]
 """A diagnosis, and whether its verdict was right."""
 
 
-def cases_of(folder: Path) -> list[Case]:
-    """Return the diagnoses of a finished check by the project's own method, beside the truth."""
+def outcomes_of(folder: Path) -> list[Outcome]:
+    """Return what the project's own method said in a finished check, beside the truth."""
     check = BlindCheck.open(folder)
     answers = check.unseal()
-    outcomes = [
+    return [
         Outcome.of(answers[index], values)
         for (method, index), values in check.read_verdicts().items()
         if method == check.methods[0]
     ]
-    return [(o.diagnosis, o.right) for o in outcomes if o.diagnosis is not None]
 
 
 def calibrated(cases: Sequence[Case]) -> dict[Group, tuple[float, ...]]:
@@ -73,8 +74,27 @@ def left_out(cases: Sequence[Case]) -> list[tuple[float, bool]]:
     return pairs
 
 
+def widening(outcomes: Sequence[Outcome]) -> tuple[float, ...]:
+    """Return the factors with which 95 % of the true values would lie in their intervals.
+
+    Never narrower than the theory says; unchanged where no case tells.
+    """
+    found = []
+    for count, present in enumerate(WIDENING):
+        mine = [
+            deviation
+            for outcome in outcomes
+            if min(len(outcome.named), len(WIDENING) - 1) == count
+            for kind in outcome.deviations()
+            for deviation in kind
+        ]
+        factor = float(np.quantile(mine, _COVERAGE, method="higher")) if mine else 1.0
+        found.append(round(max(present * factor, 1.0), 2))
+    return tuple(found)
+
+
 def summary(cases: Sequence[Case]) -> Iterable[str]:
-    """Yield the lines of the table."""
+    """Yield the lines of the table of confidence."""
     for kind, beta in calibrated(cases).items():
         mine = [right for diagnosis, right in cases if group(diagnosis) == kind]
         yield f'    "{kind}": {beta},  # {sum(mine)} of {len(mine)} right'
@@ -82,5 +102,7 @@ def summary(cases: Sequence[Case]) -> Iterable[str]:
 
 
 if __name__ == "__main__":
-    for line in summary([case for folder in sys.argv[1:] for case in cases_of(Path(folder))]):
+    every = [outcome for folder in sys.argv[1:] for outcome in outcomes_of(Path(folder))]
+    for line in summary([(o.diagnosis, o.right) for o in every if o.diagnosis is not None]):
         print(line)
+    print(f"WIDENING = {widening(every)}")

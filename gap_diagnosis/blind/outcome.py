@@ -146,25 +146,28 @@ class Outcome:
                 found += 1
         return found
 
-    def covered(self) -> tuple[list[bool], list[bool]]:
-        """Return whether intervals hold the truth: bare parameters, effect parameters.
+    def deviations(self) -> tuple[list[float], list[float]]:
+        """Return how far the truth lies from each value: bare parameters, effect parameters.
 
+        In units of the way to the end of the interval on that side, which holds the truth up to 1.
         Only where the verdict is right, and only of parameters that mean the same in both plants.
         """
         if self.diagnosis is None or not self.right or self.abstains:
             return [], []
         truths = dict(self.answer.plant)
-        bare = [self._holds(name, value) for name, value in truths.items()]
+        bare = [self._deviation(name, value) for name, value in truths.items()]
         known = [
-            self._holds(name, value)
+            self._deviation(name, value)
             for effect in self.answer.effects
             if effect.name in self.named
             for name, value in effect.catalogue.items()
         ]
         return [b for b in bare if b is not None], [k for k in known if k is not None]
 
-    def _holds(self, name: str, value: float) -> bool | None:
+    def _deviation(self, name: str, value: float) -> float | None:
         estimate = self.diagnosis.parameters.get(name) if self.diagnosis else None
         if estimate is None or not estimate.low < estimate.high:
             return None
-        return estimate.low <= value <= estimate.high
+        end = estimate.high if value > estimate.value else estimate.low
+        off, reach = abs(value - estimate.value), abs(end - estimate.value)
+        return off / reach if reach else math.inf if off else 0.0

@@ -96,7 +96,7 @@ def scores(outcomes: Sequence[Outcome]) -> dict[str, Score]:
         if o.diagnosis and o.first and o.diagnosis.gap_closed is not None
     ]
     pairs = [(o.diagnosis.confidence, o.right) for o in outcomes if o.diagnosis]
-    covers = [o.covered() for o in outcomes]
+    deviations = [o.deviations() for o in outcomes]
     return {
         "false_alarm": rate(bool(o.named) for o in empty),
         "abstained_without_effect": rate(o.verdict not in (*NO_EFFECT,) and not o.named
@@ -111,16 +111,16 @@ def scores(outcomes: Sequence[Outcome]) -> dict[str, Score]:
         "nonstationary_found": rate(o.right for o in _of(outcomes, "nonstationary")),
         "gap_closed_median": bootstrapped(closed, lambda c: float(np.median(c))),
         "calibration_error": bootstrapped(pairs, calibration_error),
-        "coverage_bare": bootstrapped([bare for bare, _ in covers if bare], _pooled),
-        "coverage_effect": bootstrapped([effect for _, effect in covers if effect], _pooled),
+        "coverage_bare": bootstrapped([bare for bare, _ in deviations if bare], _covered),
+        "coverage_effect": bootstrapped([effect for _, effect in deviations if effect], _covered),
         "verdict_right": rate(o.right for o in outcomes),
         "seconds_median": bootstrapped([o.seconds for o in outcomes],
                                        lambda s: float(np.median(s))),
     }  # fmt: skip
 
 
-def _pooled(hits: Sequence[Sequence[bool]]) -> float:
-    return float(np.mean([hit for case in hits for hit in case]))
+def _covered(deviations: Sequence[Sequence[float]]) -> float:
+    return float(np.mean([deviation <= 1.0 for case in deviations for deviation in case]))
 
 
 def _confidently_named(outcome: Outcome) -> bool:
