@@ -53,6 +53,14 @@ EXCITATION = ParameterGroup(
         1e6,
     ),
     Parameter("realizations", 7, "", "Phase realizations of each level (M)", 1, 100_000),
+    Parameter(
+        "order",
+        "levels",
+        "",
+        "Order of the realizations: level after level, or interleaved, one of each level in turn, "
+        "so that a drift of the rig does not pose as an effect of amplitude",
+        choices=("levels", "interleaved"),
+    ),
     Parameter("periods", 2, "", "Periods kept of each realization (P)", 1, 100_000),
     Parameter("transient_periods", 1, "", "Periods discarded before those", 0, 1000),
     Parameter("seed", 1, "", "Seed of the grid and of all phases", 0, 2**31 - 1),
@@ -207,6 +215,7 @@ def describe(
         realizations=parameters["realizations"],
         level=level,
         levels=len(levels),
+        order=parameters["order"],
         amplitude_rad=_line_amplitudes(levels[level], parameters["line_shape"], len(grid.excited)),
         excited_harmonics=list(grid.excited),
         detection_harmonics=list(grid.detection),

@@ -76,8 +76,11 @@ class Campaign:
     @property
     def runs(self) -> list[tuple[int, int]]:
         """All (level, realization), in the order in which they are run."""
-        realizations = self.values["excitation"]["realizations"]
-        return [(level, number) for level in range(self.levels) for number in range(realizations)]
+        numbers = range(self.values["excitation"]["realizations"])
+        all_runs = [(level, number) for level in range(self.levels) for number in numbers]
+        if self.values["excitation"]["order"] == "interleaved":
+            all_runs.sort(key=lambda run: run[1])
+        return all_runs
 
     def experiment(self, level: int, realization: int) -> Experiment:
         """Return the description of one realization."""

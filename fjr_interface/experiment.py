@@ -22,6 +22,7 @@ class Experiment(BaseModel):
 
     Harmonics are multiples of the grid's base frequency f0 = sample_rate_hz / samples_per_period.
     The reference rises from zero over soft_start_s (raised cosine), within the discarded periods.
+    Realizations are played level after level, or interleaved: one of each level in turn.
     Further keys are kept and ignored.
     """
 
@@ -36,6 +37,7 @@ class Experiment(BaseModel):
     realizations: int = Field(1, ge=1)
     level: int = Field(0, ge=0)
     levels: int = Field(1, ge=1)
+    order: Literal["levels", "interleaved"] = "levels"
     amplitude_rad: float | list[float]
     excited_harmonics: Harmonics = Field(min_length=1)
     detection_harmonics: Harmonics = []
@@ -63,6 +65,18 @@ class Experiment(BaseModel):
     def samples(self) -> int:
         """Number of samples of the realization, transient included."""
         return self.samples_per_period * (self.periods + self.transient_periods)
+
+    @property
+    def played_before(self) -> int:
+        """How many realizations of the experiment are played before this one."""
+        if self.order == "interleaved":
+            return self.realization * self.levels + self.level
+        return self.level * self.realizations + self.realization
+
+    @property
+    def elapsed_s(self) -> float:
+        """Time at which the realization starts if all are played without a break."""
+        return self.played_before * self.samples / self.sample_rate_hz
 
     @property
     def base_frequency_hz(self) -> float:

@@ -11,7 +11,7 @@ from fjr_interface.errors import InputError
 from fjr_interface.experiment import Experiment
 
 from . import effects, plant, rig
-from .simulator import elapsed_s, encoder_noise
+from .simulator import encoder_noise
 
 
 class LockstepDrive:
@@ -36,7 +36,7 @@ class LockstepDrive:
         self._plant = plant.coefficients(values)
         self._link_side = rig.MOTOR if plant.rigid_sums(values) is not None else rig.LINK
         self._effects = effects.coefficients(values)
-        self._state = rig.at_rest(elapsed_s(experiment))
+        self._state = rig.at_rest(experiment.elapsed_s)
         rig.hold(rig.at_rest(), 0.0, self._period_s, self._plant, self._effects)  # compiles it
         self._stuck_motor = self._stuck_link = 0
         self.stamp = self.samples = 0

@@ -21,7 +21,7 @@ from fjr_interface.real_time import NEVER, Histogram
 
 from . import effects as fx
 from . import plant, rig
-from .simulator import elapsed_s, encoder_noise
+from .simulator import encoder_noise
 
 TORQUE_TIMEOUT = Parameter(
     "torque_timeout_s",
@@ -93,7 +93,7 @@ class RealTimeDrive:
         timeout_s = values[TORQUE_TIMEOUT.name]
         self._timeout_ns = NEVER if math.isinf(timeout_s) else round(timeout_s * 1e9)
         self._period_ns = 1e9 / experiment.sample_rate_hz
-        self._state = rig.at_rest(elapsed_s(experiment))
+        self._state = rig.at_rest(experiment.elapsed_s)
         rig.hold(rig.at_rest(), 0.0, 1e-4, self._plant, self._effects)  # compiles it
         rig.measure(self._state, 0.0, self._effects)
         self._pending: deque[tuple[int, float]] = deque()

@@ -81,15 +81,9 @@ def _closed_loop(
         law_of(experiment.controller, rate),
         noise,
         effects.coefficients(values),
-        elapsed_s(experiment),
+        experiment.elapsed_s,
     )
     return run if plant.rigid_sums(values) is None else replace(run, link=run.motor)
-
-
-def elapsed_s(experiment: Experiment) -> float:
-    """Return the time at which a realization starts if all are played without a break (s)."""
-    before = experiment.level * experiment.realizations + experiment.realization
-    return before * experiment.samples / experiment.sample_rate_hz
 
 
 def run_realization(values: Mapping[str, Any], experiment: Experiment) -> Trajectory:

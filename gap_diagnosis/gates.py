@@ -135,8 +135,8 @@ def bags_gate(
     if not drifts:
         return _untested("stationary over realizations", "levels of two bags, two periods each")
     worst = max(drifts, key=lambda drift: (drift.levels_agree, drift.z))
-    run_s = recorded.experiment.samples / recorded.experiment.sample_rate_hz
-    change = worst.slope_per_s * run_s * (len(recorded.realizations) - 1)
+    elapsed_s = [r.experiment.elapsed_s for r in recorded.realizations]
+    change = worst.slope_per_s * (max(elapsed_s) - min(elapsed_s))
     limit = BAG_Z_LIMIT * max(misfit / MISFIT_WITHOUT_STRUCTURE, 1.0) ** 0.5
     passed = worst.z <= limit or not worst.levels_agree
     if passed:

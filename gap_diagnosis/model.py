@@ -110,8 +110,7 @@ class Simulator:
             self._observer = prediction.observer(recorded)
         self._periods = max(description.transient_periods, 1) + 1
         self._inputs = [self._mean_inputs(realization) for realization in recorded.realizations]
-        run_s = description.samples / self.sample_rate_hz
-        self._elapsed = [index * run_s for index in range(len(self._inputs))]
+        self._elapsed = [realization.experiment.elapsed_s for realization in recorded.realizations]
 
     def many(self, models: Sequence[Model], which: Sequence[int] | None = None) -> np.ndarray:
         """Return one steady period of the measured outputs for each model.

@@ -122,7 +122,7 @@ class BagDrift:
             explain.
         z: significance of differences between the bags of a level, standard normal if there are
             none.
-        slope_per_s: relative change per second of the record, along the order of bags in levels.
+        slope_per_s: relative change per second of the record, as bags differ within levels.
         levels_agree: whether two levels (or the only one) show a change of the same sign; what a
             wrong model leaves may differ in one.
     """
@@ -158,15 +158,15 @@ def bag_drift(
     columns = _parts(sensitivity * scale).transpose(1, 2, 0)
     fits = [_fit(a, b) for a, b in zip(columns, _parts(residuals * scale), strict=True)]
     deviation, spread = (np.array(column) for column in zip(*fits, strict=True))
-    run_s = recorded.experiment.samples / recorded.experiment.sample_rate_hz
+    elapsed_s = np.array([r.experiment.elapsed_s for r in recorded.realizations])
     return [
         BagDrift(
             group,
             deviation[:, i],
             spread[:, i],
             _difference_z(deviation[:, i], spread[:, i], levels),
-            _slope(deviation[:, i], spread[:, i], levels)[0] / run_s,
-            _agree(deviation[:, i], spread[:, i], levels),
+            _slope(deviation[:, i], spread[:, i], levels, elapsed_s)[0],
+            _agree(deviation[:, i], spread[:, i], levels, elapsed_s),
         )
         for i, group in enumerate(groups)
     ]
@@ -214,18 +214,22 @@ def _difference_z(deviation: np.ndarray, std: np.ndarray, levels: np.ndarray) ->
     return float(stats.norm.isf(np.clip(stats.chi2.sf(q, degrees), 1e-300, 1.0 - 1e-15)))
 
 
-def _slope(deviation: np.ndarray, std: np.ndarray, levels: np.ndarray) -> tuple[float, float]:
-    """Return the change per bag within levels, and its standard deviation."""
-    order = _within(np.arange(levels.size), std, levels)
+def _slope(
+    deviation: np.ndarray, std: np.ndarray, levels: np.ndarray, elapsed_s: np.ndarray
+) -> tuple[float, float]:
+    """Return the change per second within levels, and its standard deviation."""
+    time = _within(elapsed_s, std, levels)
     weight = std**-2.0
-    power = float(np.sum(weight * order**2))
-    return float(np.sum(weight * order * deviation)) / power, power**-0.5
+    power = float(np.sum(weight * time**2))
+    return float(np.sum(weight * time * deviation)) / power, power**-0.5
 
 
-def _agree(deviation: np.ndarray, std: np.ndarray, levels: np.ndarray) -> bool:
+def _agree(
+    deviation: np.ndarray, std: np.ndarray, levels: np.ndarray, elapsed_s: np.ndarray
+) -> bool:
     """Tell whether two levels, or the only one that can, show a change of the same sign."""
     members = [np.flatnonzero(levels == level) for level in np.unique(levels)]
     members = [at for at in members if at.size > 1]
-    slopes = [_slope(deviation[at], std[at], levels[at]) for at in members]
+    slopes = [_slope(deviation[at], std[at], levels[at], elapsed_s[at]) for at in members]
     seen = [slope > 0.0 for slope, spread in slopes if abs(slope) > SEEN * spread]
     return max(seen.count(True), seen.count(False)) >= min(len(members), 2)

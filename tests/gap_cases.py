@@ -63,6 +63,7 @@ def simulate_case(
     noise_rad: float = NOISE_RAD,
     with_link: bool = False,
     base_frequency_hz: float = 0.25,
+    order: str = "levels",
     controller: Mapping[str, Any] | None = None,
     plant: Mapping[str, float] | None = None,
 ) -> Case:
@@ -81,6 +82,7 @@ def simulate_case(
         {
             "base_frequency_hz": base_frequency_hz,
             "f_min_hz": base_frequency_hz,
+            "order": order,
             "amplitudes_rad": tuple(levels_rad),
             "realizations": realizations,
             "periods": periods,

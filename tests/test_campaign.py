@@ -47,6 +47,21 @@ def test_simulate_makes_a_new_folder_and_names_it_last(tmp_path):
     assert (experiment.level, experiment.amplitude_rad, experiment.levels) == (1, 7e-3, 2)
 
 
+@pytest.mark.parametrize(
+    ("order", "runs"),
+    [
+        ("levels", [(0, 0), (0, 1), (0, 2), (1, 0), (1, 1), (1, 2)]),
+        ("interleaved", [(0, 0), (1, 0), (0, 1), (1, 1), (0, 2), (1, 2)]),
+    ],
+)
+def test_realizations_are_played_in_the_order_that_the_description_gives(order, runs):
+    values = {"order": order, "amplitudes_rad": (1e-3, 7e-3), "realizations": 3}
+    campaign = Campaign.create(overrides={"excitation": values})
+    assert campaign.runs == runs
+    starts = [campaign.experiment(*run).elapsed_s for run in runs]
+    assert starts == [30.0 * number for number in range(6)]
+
+
 def test_options_win_over_settings_and_these_over_the_file(tmp_path):
     rig = tmp_path / "rig.yaml"
     rig.write_text("/rig/simulator: {ros__parameters: {k1: 5.0, fs: 1.0}}\n")

@@ -76,9 +76,12 @@ def test_drift_between_periods_is_seldom_seen_where_there_is_none():
     assert max(scores) < PERIOD_Z_LIMIT
 
 
-@pytest.mark.parametrize("per_s", [1e-4, -1e-4, 1e-3])
-def test_drift_of_friction_is_seen_within_bags_and_measured_between_them(per_s):
-    case = simulate_case({"nonstationary.friction_per_s": per_s}, seed=6)
+@pytest.mark.parametrize(
+    ("per_s", "order"),
+    [(1e-4, "levels"), (-1e-4, "levels"), (1e-3, "levels"), (1e-4, "interleaved")],
+)
+def test_drift_of_friction_is_seen_within_bags_and_measured_between_them(per_s, order):
+    case = simulate_case({"nonstationary.friction_per_s": per_s}, seed=6, order=order)
     report = check_gates(case.recorded, NOMINAL)
     assert report.hint == "nonstationary"
     assert "stationary over periods" in [gate.name for gate in report.failures]

@@ -219,7 +219,7 @@ class CaseMaker:
         return Run(
             multisine.reference(experiment),
             self._noise_rad * noise,
-            index * experiment.samples / experiment.sample_rate_hz,
+            experiment.elapsed_s,
             experiment.samples_per_period,
             experiment.periods,
             max(experiment.excited_harmonics) + 1,
