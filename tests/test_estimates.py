@@ -57,7 +57,10 @@ def test_a_parameter_that_one_group_alone_tells_is_not_called_certain():
 
 
 def said(count: int, *offs: float) -> Outcome:
-    """Return a right verdict of so many effects, its first parameters that many standard errors off."""
+    """Return a right verdict of so many effects, its first parameters off by so much.
+
+    The interval is 1 to both sides before it is widened.
+    """
     names = ("delay", "backlash")[:count]
     true = [Effect(name, 1.0, 1.0, 1.0, {}) for name in names]
     parameters = {

@@ -4,9 +4,9 @@ Each folder is a finished blind check of the method `fjr` whose seed is for trai
 
     fjr blind run --cases 60 --seed 100 --method fjr --out training/100
 
-It prints the tables for `gap_diagnosis.confidence` and `gap_diagnosis.estimates` with what they rest
-on. Each group of verdicts has a logistic regression with a Gaussian prior, so that few misses do
-not make one certain; the expected calibration error is that of leaving each case out in turn.
+It prints the tables for `gap_diagnosis.confidence` and `gap_diagnosis.estimates` with what they
+rest on. Each group of verdicts has a logistic regression with a Gaussian prior, so that few misses
+do not make one certain; the expected calibration error is that of leaving each case out in turn.
 """
 
 from __future__ import annotations
