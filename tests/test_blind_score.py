@@ -80,6 +80,17 @@ def test_equivalences_hold_only_where_they_are_exact():
     assert indistinguishable(hanging) == {"gravity"}
 
 
+def test_a_torque_gain_scales_the_bare_parameters_that_intervals_should_hold():
+    answer = Answer("single", [effect("torque_gain")], NOMINAL, 2e-5, {"gain_error": -0.1})
+    scaled = {name: value / 0.9 for name, value in NOMINAL.items()}
+    parameters = {
+        name: Estimate(value=0.99 * v, low=0.97 * v, high=1.01 * v) for name, v in scaled.items()
+    }
+    said = outcome("single", [], "parameters_only", parameters=parameters).diagnosis
+    bare, effects = Outcome("case_000", "fjr", answer, said, "", 1.0).deviations()
+    assert bare == pytest.approx([0.5] * len(NOMINAL)) and effects == []
+
+
 def test_a_rate_has_the_clopper_pearson_interval():
     found = rate([True] * 9 + [False])
     assert found.value == 0.9

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from gap_cases import SHORT, fitter_of, simulate_case
 
 from gap_diagnosis.blind.calibrate import widening
 from gap_diagnosis.blind.cases import NOMINAL, Answer, Effect
 from gap_diagnosis.blind.outcome import Outcome
 from gap_diagnosis.diagnosis import Diagnosis, Estimate, Gaps
-from gap_diagnosis.estimates import WIDENING, standard_errors
+from gap_diagnosis.estimates import WIDENING, estimates, standard_errors
 
 LINES, GROUPS = 600, 12
 AT = np.linspace(0.0, 1.0, LINES)
@@ -86,3 +87,30 @@ def test_blind_cases_tell_by_how_much_intervals_must_be_widened():
     assert none == 1.0  # never narrower than the theory says
     assert one == pytest.approx(0.8 * 1.96, rel=0.1) and two == pytest.approx(2.0 * 1.96, rel=0.1)
     assert widening([]) == pytest.approx(WIDENING)
+
+
+def test_intervals_tell_of_a_valley_along_which_parameters_replace_each_other():
+    """Seen from zero, an eccentric encoder errs in gain, which scales all but Coulomb friction."""
+    truth = {"encoder_eccentricity.amplitude_rad": 0.15, "encoder_eccentricity.phase_rad": -1.25}
+    case = simulate_case(truth, seed=3, noise_rad=5e-4, **SHORT)
+    fitter = fitter_of(case)[2]
+    refit = fitter.refit()
+    screening = fitter.screening(refit, "encoder_eccentricity")
+    fit = fitter.add(refit, "encoder_eccentricity", screening.proposals())
+    assert fit.converged and fit.held_chi2 / fitter.held.size < 1.2
+    found = estimates(fit, fitter.train.groups())
+    for name, value in case.truth.plant.items():
+        std = (found[name].high - found[name].low) / 3.92
+        assert abs(found[name].value - value) < 4.0 * std, name
+    assert found["jm"].high - found["jm"].low > 0.02 * found["jm"].value
+
+
+def test_the_jacobian_that_intervals_rest_on_is_exact_where_the_loop_bends_soon():
+    fitter = fitter_of(simulate_case(seed=0, **SHORT))[2]
+    fit = fitter.refit()
+    x, half = fit.solution.x, 1e-6
+    points = [x + sign * half * row for row in np.eye(x.size) for sign in (1.0, -1.0)]
+    errors = fitter.train.errors([fit.space.model(point) for point in points])
+    central = ((errors[0::2] - errors[1::2]) / (2.0 * half)).T
+    off = np.linalg.norm(fit.solution.jacobian - central, axis=0)
+    assert (off < 1e-3 * np.linalg.norm(central, axis=0)).all()

@@ -87,6 +87,12 @@ class Answer:
     noise_rad: float
     settings: dict[str, float] = field(default_factory=dict)
 
+    @property
+    def plant_seen(self) -> dict[str, float]:
+        """The bare parameters as the commanded torque sees them: its gain scales them all."""
+        gain = 1.0 + self.settings.get("gain_error", 0.0)
+        return {name: value / gain for name, value in self.plant.items()}
+
     def to_json(self) -> dict[str, Any]:
         """Return what is sealed."""
         return asdict(self)

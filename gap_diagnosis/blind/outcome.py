@@ -154,8 +154,8 @@ class Outcome:
         """
         if self.diagnosis is None or not self.right or self.abstains:
             return [], []
-        truths = dict(self.answer.plant)
-        bare = [self._deviation(name, value) for name, value in truths.items()]
+        seen = self.answer.plant_seen
+        bare = [self._deviation(name, value) for name, value in seen.items()]
         known = [
             self._deviation(name, value)
             for effect in self.answer.effects
