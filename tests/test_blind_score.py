@@ -81,7 +81,8 @@ def test_equivalences_hold_only_where_they_are_exact():
 
 
 def test_a_torque_gain_scales_the_bare_parameters_that_intervals_should_hold():
-    answer = Answer("single", [effect("torque_gain")], NOMINAL, 2e-5, {"gain_error": -0.1})
+    gain = Effect("torque_gain", 0.1, None, 0.0, {})
+    answer = Answer("single", [gain], NOMINAL, 2e-5, {"gain_error": -0.1})
     scaled = {name: value / 0.9 for name, value in NOMINAL.items()}
     parameters = {
         name: Estimate(value=0.99 * v, low=0.97 * v, high=1.01 * v) for name, v in scaled.items()
