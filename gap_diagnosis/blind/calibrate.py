@@ -75,7 +75,7 @@ def left_out(cases: Sequence[Case]) -> list[tuple[float, bool]]:
 
 
 def widening(outcomes: Sequence[Outcome]) -> tuple[float, ...]:
-    """Return the factors with which 95 % of the true values would lie in their intervals.
+    """Return the factors with which the intervals of bare parameters would hold 95 % of the truths.
 
     Never narrower than the theory says; unchanged where no case tells.
     """
@@ -85,8 +85,7 @@ def widening(outcomes: Sequence[Outcome]) -> tuple[float, ...]:
             deviation
             for outcome in outcomes
             if min(len(outcome.named), len(WIDENING) - 1) == count
-            for kind in outcome.deviations()
-            for deviation in kind
+            for deviation in outcome.deviations()[0]
         ]
         factor = float(np.quantile(mine, _COVERAGE, method="higher")) if mine else 1.0
         found.append(round(max(present * factor, 1.0), 2))
