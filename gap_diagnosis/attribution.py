@@ -85,6 +85,12 @@ def _partners(found: Sequence[str], among: set[str]) -> list[str]:
     return sorted(among & set().union(*groups))
 
 
+def _stands_for(effects: Sequence[str], others: Sequence[str]) -> bool:
+    """Tell whether explanations differ by one effect and a near equivalent of it."""
+    mine, theirs = set(effects) - set(others), set(others) - set(effects)
+    return len(mine) == 1 and bool(_partners(sorted(theirs), mine))
+
+
 class Search:
     """The search over explanations of one experiment."""
 
@@ -240,10 +246,13 @@ class Search:
         return fit.train_chi2 < _NEAR * best
 
     def _polish(self, count: int) -> None:
-        """Take fits further that have not converged but would lead."""
-        best = min((f.train_chi2 for f in self._ranked(count)), default=math.inf)
+        """Take fits further that have not converged but would lead, or stand for what leads."""
+        ranked = self._ranked(count)
+        best = min((fit.train_chi2 for fit in ranked), default=math.inf)
         for effects, fit in list(self._fits.items()):
-            if len(effects) == count and not fit.converged and fit.train_chi2 < best:
+            stands = ranked and _stands_for(effects, ranked[0].effects)
+            limit = _NEAR * best if stands else best
+            if len(effects) == count and not fit.converged and fit.train_chi2 < limit:
                 self._progress(f"{' + '.join(effects)}, further")
                 self._fits[effects] = self._fitter.continued(fit)
 
