@@ -212,7 +212,7 @@ class Fitter:
         """
         names = tuple(sorted((*parent.effects, effect)))
         if proposals[0][0] > _NO_PROMISE * parent.train_chi2:
-            return self._without_promise(parent, effect, names, proposals[0])
+            return self._without_promise(parent, effect, names, proposals[0], give_up_above)
         fits: list[Fit] = []
         for _, space, point in _different(proposals, _KEPT_STARTS):
             limit = give_up_above
@@ -294,11 +294,17 @@ class Fitter:
         return Fit(rest, space.model(x), space, solution, cost, float("inf"))
 
     def _without_promise(
-        self, parent: Fit, effect: str, names: tuple[str, ...], proposal: Proposal
+        self,
+        parent: Fit,
+        effect: str,
+        names: tuple[str, ...],
+        proposal: Proposal,
+        give_up_above: float | None,
     ) -> Fit:
         """Return the parent with next to nothing of the effect, never worse than the parent.
 
-        No start gained anything, so that this is where the effect ends, as converged as the parent.
+        No start gained anything; if a step from there gains nothing either, this is where the
+        effect ends, as converged as the parent.
         """
         cost, space, start = proposal
         if cost > parent.train_chi2:
@@ -307,6 +313,9 @@ class Fitter:
             space = self._space(parent, seed)
             start = np.clip(space.point(parent.model), *space.bounds())
         fit = self._solve(names, space, start, most_steps=1, known=parent.solution.jacobian)
+        if fit.train_chi2 < _NO_PROMISE * parent.train_chi2:
+            known = fit.solution.jacobian
+            return self._solve(names, space, fit.solution.x, give_up_above, known=known)
         return replace(fit, solution=replace(fit.solution, converged=parent.converged))
 
     def _solve(

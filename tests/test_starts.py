@@ -51,3 +51,14 @@ def test_an_eccentric_encoder_is_followed_along_its_valley():
     truth = {"encoder_eccentricity.amplitude_rad": 0.12, "encoder_eccentricity.phase_rad": -0.6}
     fit, left = fitted(truth, "encoder_eccentricity", more=True)
     assert fit.converged and left < 1.5
+
+
+def test_an_effect_that_no_start_shows_is_found_if_a_step_from_there_gains():
+    """An eccentric encoder that errs in gain wants all bare parameters to follow far."""
+    truth = {"encoder_eccentricity.amplitude_rad": 0.2, "encoder_eccentricity.phase_rad": 0.05}
+    fitter = fitter_of(simulate_case(truth, seed=1, noise_rad=2.8e-3, **SHORT))[2]
+    refit = fitter.refit()
+    proposals = fitter.screening(refit, "encoder_eccentricity").proposals()
+    assert proposals[0][0] > refit.train_chi2
+    fit = fitter.add(refit, "encoder_eccentricity", proposals)
+    assert fit.converged and fit.held_chi2 / fitter.held.size < 1.5
