@@ -75,7 +75,7 @@ class Experiment(BaseModel):
 
     @property
     def elapsed_s(self) -> float:
-        """Time at which the realization starts if all are played without a break."""
+        """Time at which the realization starts if all are played without a break (s)."""
         return self.played_before * self.samples / self.sample_rate_hz
 
     @property

@@ -2,8 +2,8 @@
 
 One regression for each kind of verdict, on a few figures of the ranking. The coefficients are not
 set by hand: `gap_diagnosis.blind.calibrate` fits them to blind cases whose answers are open, and
-prints this table. They were fitted to the 120 cases of the seeds 102 (48) and 103 (72), on which
-nothing else of the diagnosis was developed; so few were missed that the prior still counts.
+prints this table. They were fitted to the 120 cases of the seeds 102 (48) and 103 (72), before what
+these cases showed was mended; so few were missed that the prior still counts.
 """
 
 from __future__ import annotations

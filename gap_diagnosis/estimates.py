@@ -18,7 +18,8 @@ from .fits import Fit
 WIDENING: tuple[float, ...] = (1.0, 1.45, 1.81)
 """Factor on the standard errors of the bare parameters in a fit with no effect, one, and more.
 
-From `gap_diagnosis.blind.calibrate` on the seeds 102 and 103: 232, 376 and 96 parameters.
+From `gap_diagnosis.blind.calibrate` on the seeds 102 and 103, 232, 376 and 96 parameters; most of
+103 was fitted with the coarser finite differences of then.
 """
 _NORMAL_95 = 1.96
 
