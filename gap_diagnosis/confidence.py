@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from typing import Literal
 
-from .attribution import WELL_EXPLAINED
+from .attribution import tolerated
 from .diagnosis import Candidate, Diagnosis
 
 Group = Literal["named", "nothing", "abstained", "gate"]
@@ -60,7 +60,7 @@ def features(diagnosis: Diagnosis) -> tuple[float, ...]:
     if kind == "nothing":
         return 1.0, _log(refit / best)
     if kind == "abstained":
-        return 1.0, _log(left / WELL_EXPLAINED), _log(refit / best)
+        return 1.0, _log(left / tolerated(refit)), _log(refit / best)
     lead = min((_floored(c) for c in ranked if not _in_set(c, diagnosis)), default=refit) / left
     second = float(len(diagnosis.effects) > 1)
     return 1.0, _log(lead), _log(left), second, float(diagnosis.verdict == "ambiguous")

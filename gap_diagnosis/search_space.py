@@ -14,8 +14,12 @@ from fjr_sim_node import plant
 from .model import Model
 
 TOLERANCE = 0.1
-"""How far a datasheet value may be off; fits look three times as far, since a torque constant that
-is off scales all values."""
+"""How far a datasheet value may be off; fits look further, since a torque constant that is off
+scales all values, and an encoder whose gain is off (an eccentric one, locally) once more."""
+
+_SCALES = {"k1": 3.0}
+"""How many factors of 1 + 3 TOLERANCE fits look away from a nominal value, where not two: k1 goes
+with the cube of the position."""
 
 _CYCLES = (1.0, 2.0, 4.0, 8.0, 16.0, 24.0, 36.0, 52.0, 72.0, 96.0, 120.0)
 """Ripples per turn to try where the loop cannot be repeated; else `ripples` finds better."""
@@ -36,9 +40,8 @@ STARTS: dict[str, tuple[dict[str, tuple[float, ...]], ...]] = {
     ),
     "torque_bias": ({"torque_nm": (0.3,)},),
     "presliding_friction": (
-        {"motor_rad": (2e-4, 2e-3), "link_rad": (0.0,)},
-        {"motor_rad": (0.0,), "link_rad": (2e-4, 2e-3)},
-    ),
+        {"motor_rad": (2e-5, 2e-4, 2e-3), "link_rad": (2e-5, 2e-4, 2e-3)},
+    ),  # a side that starts below what is negligible never leaves it
     "load_friction": ({"coefficient": (0.01, 0.05)},),
     "position_friction": (
         {
@@ -104,8 +107,8 @@ FIT_BOUNDS: dict[str, tuple[float, float]] = {
 """Narrower bounds of shape parameters: beyond them the data say nothing, or the loop diverges."""
 
 NEGLIGIBLE: dict[str, float] = {
-    "presliding_friction.motor_rad": 1e-5,
-    "presliding_friction.link_rad": 1e-5,
+    "presliding_friction.motor_rad": 2e-6,
+    "presliding_friction.link_rad": 2e-6,
     "actuator_lag.time_constant_s": 2e-5,
 }
 """Sizes below which an effect counts as off, since it would only make the plant stiff."""
@@ -180,9 +183,9 @@ class Space:
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Return lower and upper bounds of a point."""
-        far = np.log1p(3.0 * self.tolerance)
-        low = [-far if value else 0.0 for value in self.nominal.values()]
-        high = [far if value else 0.0 for value in self.nominal.values()]
+        scale = np.log1p(3.0 * self.tolerance)
+        far = [_SCALES.get(n, 2.0) * scale if v else 0.0 for n, v in self.nominal.items()]
+        low, high = [-f for f in far], far
         for name, unit in zip(self.effects, self.units, strict=True):
             parameter = _PARAMETER[name]
             least, most = FIT_BOUNDS.get(name, (parameter.low, parameter.high))

@@ -8,7 +8,7 @@ import pytest
 
 from gap_diagnosis.blind.cases import NOMINAL, Answer, CaseMaker, Plan, plans
 from gap_diagnosis.blind.draws import COMBINED, SINGLE, Draw
-from gap_diagnosis.blind.limits import FLOORS, Run, Sizes, Visibility
+from gap_diagnosis.blind.limits import FLOORS, Run, Sizes, Visibility, play
 from gap_diagnosis.records import read_experiment
 
 
@@ -68,10 +68,19 @@ def test_a_bias_shows_as_its_static_deflection_over_the_floor(visibility):
     assert visibility.of({"bias_nm": bias}) == pytest.approx(expected, rel=0.05)
 
 
-def test_what_a_refit_absorbs_does_not_show(visibility):
-    seen = visibility.of({"gain_error": 0.01})
-    without_refit = visibility._change(NOMINAL, {"gain_error": 0.01})
+@pytest.mark.parametrize("size", [0.01, 0.1, 0.3])
+def test_what_a_refit_absorbs_does_not_show_however_large_it_is(visibility, size):
+    seen = visibility.of({"gain_error": size})
+    without_refit = visibility._change(NOMINAL, {"gain_error": size})
     assert seen < 0.05 * np.sqrt(np.mean(np.abs(without_refit) ** 2))
+    assert seen < FLOORS
+
+
+def test_an_eccentric_encoder_shows_by_more_than_its_gain(visibility):
+    # y = th + a sin(th + phase): at phase 0 a gain of 1 + a to first order, else a constant too
+    gain = visibility.of({"eccentricity_rad": 0.15, "eccentricity_phase_rad": 0.0})
+    constant = visibility.of({"eccentricity_rad": 0.15, "eccentricity_phase_rad": 1.57})
+    assert gain < FLOORS < constant
 
 
 def test_the_limit_shows_three_floors(visibility):
@@ -83,7 +92,7 @@ def test_the_limit_shows_three_floors(visibility):
 
 def test_what_can_never_be_seen_has_no_limit(visibility):
     tiny = Sizes(Draw("torque_bias", {"bias_nm": 1.0}, 1e-9, 1e-8), visibility)
-    gain = Sizes(Draw("torque_gain", {"gain_error": 1.0}, 0.05, 0.1, absorbed=True), visibility)
+    gain = Sizes(Draw("torque_gain", {"gain_error": 1.0}, 0.05, 0.1), visibility)
     assert tiny.limit is None
     assert gain.limit is None
 
@@ -134,3 +143,20 @@ def test_nothing_in_the_bags_tells_what_the_case_holds(tmp_path):
 
 def test_an_answer_survives_its_json(made):
     assert Answer.from_json(made[1].to_json()) == made[1]
+
+
+@pytest.mark.parametrize(
+    ("effect", "settings"),
+    [
+        ("torque_gain", {"gain_error": -0.2}),
+        ("encoder_eccentricity", {"eccentricity_rad": 0.2, "eccentricity_phase_rad": np.pi}),
+    ],
+)
+def test_gains_scale_the_bare_parameters_that_the_loop_sees(effect, settings):
+    run = short_run(1e-2, 0.0)
+    answer = Answer("single", [], NOMINAL, 0.0, settings)
+    there = play(run, NOMINAL, settings).y[1000:]
+    seen = play(run, answer.plant_seen(), {}).y[1000:]
+    bare = play(run, answer.plant_seen([effect]), {}).y[1000:]
+    assert np.std(seen - there) < 3e-3 * np.std(there)
+    assert np.std(bare - there) > 3e-2 * np.std(there)

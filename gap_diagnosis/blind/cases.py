@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -87,11 +88,22 @@ class Answer:
     noise_rad: float
     settings: dict[str, float] = field(default_factory=dict)
 
-    @property
-    def plant_seen(self) -> dict[str, float]:
-        """The bare parameters as the commanded torque sees them: its gain scales them all."""
-        gain = 1.0 + self.settings.get("gain_error", 0.0)
-        return {name: value / gain for name, value in self.plant.items()}
+    def plant_seen(self, named: Collection[str] = ()) -> dict[str, float]:
+        """Return the bare parameters as the loop sees them, whatever is named apart.
+
+        A gain of the torque scales them all; one of the encoder, which an eccentric one has about
+        its zero, scales all that goes with the position, k1 with its cube.
+        """
+        seen, settings = dict(self.plant), self.settings
+        if "torque_gain" not in named:
+            torque = 1.0 + settings.get("gain_error", 0.0)
+            seen = {name: value / torque for name, value in seen.items()}
+        if "encoder_eccentricity" not in named:
+            phase = settings.get("eccentricity_phase_rad", 0.0)
+            position = 1.0 + settings.get("eccentricity_rad", 0.0) * math.cos(phase)
+            powers = {"fs": 0, "fsm": 0, "k1": 3}
+            seen = {name: v / position ** powers.get(name, 1) for name, v in seen.items()}
+        return seen
 
     def to_json(self) -> dict[str, Any]:
         """Return what is sealed."""

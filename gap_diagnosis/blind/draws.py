@@ -26,7 +26,6 @@ class Draw:
         shape: settings that do not depend on the size.
         clips: setting that limits the torque to (1.2 - size) of its peak without the effect.
         slows: setting that limits the torque's rate to its peak, sample to sample, over the size.
-        absorbed: whether a refit absorbs it exactly, so that no size can be seen.
         same_as: catalogue parameter by setting, where both mean the same.
     """
 
@@ -37,7 +36,6 @@ class Draw:
     shape: Mapping[str, float] = field(default_factory=dict)
     clips: str | None = None
     slows: str | None = None
-    absorbed: bool = False
     least: float = 0.0
     same_as: Mapping[str, str] = field(default_factory=dict)
 
@@ -170,7 +168,7 @@ def _saturation(rng: np.random.Generator) -> Draw:
 
 
 def _gain(rng: np.random.Generator) -> Draw:
-    return Draw("torque_gain", {"gain_error": _sign(rng)}, 0.05, 0.1, absorbed=True)
+    return Draw("torque_gain", {"gain_error": _sign(rng)}, 0.05, 0.1)
 
 
 def _quantization(rng: np.random.Generator) -> Draw:

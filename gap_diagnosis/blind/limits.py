@@ -1,7 +1,7 @@
 """The detection limit of an effect, found on the second plant itself.
 
-It is the size at which the steady position changes by three times the floor, after an ideal linear
-refit of the eight bare parameters. Both are compared on the DFT lines up to the highest excited,
+It is the size at which the steady position changes by three times the floor, after a refit of the
+eight bare parameters. Both are compared on the DFT lines up to the highest excited,
 at the level where the change shows best. The floor is what averaging over periods leaves of the
 noise, and 0.1 % of the signal: what a simulation may be off by discretisation alone.
 """
@@ -22,6 +22,7 @@ FLOORS = 3.0
 _STEPS_PER_SECOND = 50_000
 _REPEATABILITY = 1e-3
 _STEP = 0.02
+_REFITS, _MOST_CHANGE = 4, 0.3  # steps of a refit; of a logarithm in one step
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,8 @@ class Visibility:
         self._base = self._weigh(spectra)
         columns = [self._slope(name) for name in plant]
         stacked = np.concatenate([_real(column) for column in np.transpose(columns, (1, 0, 2))], 1)
-        self._basis = np.linalg.qr(stacked.T)[0]
+        self._slopes = stacked.T
+        self._inverse = np.linalg.pinv(self._slopes)
         torques = [
             record.u[run.samples_per_period :] for run, record in zip(runs, records, strict=True)
         ]
@@ -100,14 +102,27 @@ class Visibility:
         return self._weigh(played) - self._base
 
     def of(self, settings: Mapping[str, float]) -> float:
-        """Return the rms change over the floor at the level where it shows best."""
-        try:
-            change = self._change(self._plant, settings)
-        except FloatingPointError:
-            return np.inf
-        flat = _real(change).ravel()
-        left = flat - self._basis @ (self._basis.T @ flat)
-        return float(np.sqrt(np.mean(left.reshape(len(self._runs), -1) ** 2, 1) * 2.0).max())
+        """Return the rms change over the floor at the level where it shows best, after a refit.
+
+        The refit takes Gauss-Newton steps with the slopes of the bare plant, so that an effect that
+        only scales the parameters, however much, does not count as seen.
+        """
+        plant = dict(self._plant)
+        left = np.inf
+        for _ in range(_REFITS):
+            try:
+                change = _real(self._change(plant, settings)).ravel()
+            except FloatingPointError:
+                break
+            steps = -(self._inverse @ change)
+            rest = change + self._slopes @ steps
+            shown = np.sqrt(np.mean(rest.reshape(len(self._runs), -1) ** 2, 1) * 2.0).max()
+            left = min(left, float(shown))
+            factors = np.exp(np.clip(steps, -_MOST_CHANGE, _MOST_CHANGE))
+            plant = {n: v * f for (n, v), f in zip(plant.items(), factors.tolist(), strict=True)}
+            if np.abs(steps).max() < _STEP:
+                break
+        return left
 
 
 def _real(lines: np.ndarray) -> np.ndarray:
@@ -138,8 +153,6 @@ class Sizes:
 
     def relative(self, size: float) -> float:
         """Return how far a size shows, over what the detection limit shows."""
-        if self._draw.absorbed:
-            return 0.0
         if size not in self._known:
             settings = self._draw.settings(size, self._visibility.peaks)
             self._known[size] = self._visibility.of(settings) / FLOORS

@@ -154,7 +154,7 @@ class Outcome:
         """
         if self.diagnosis is None or not self.right or self.abstains:
             return [], []
-        seen = self.answer.plant_seen
+        seen = self.answer.plant_seen(self.named)
         bare = [self._deviation(name, value) for name, value in seen.items()]
         known = [
             self._deviation(name, value)

@@ -96,7 +96,7 @@ def _text(check: BlindCheck, scored: Mapping[str, Any], outcomes: Sequence[Outco
 def _what_is_meant() -> list[str]:
     return [
         "The detection limit of an effect is the size at which the steady position changes, after "
-        "an ideal linear refit of the bare parameters, by three times the floor (rms over the DFT "
+        "a refit of the bare parameters, by three times the floor (rms over the DFT "
         "lines up to the highest excited one, at the level where it shows best); the floor is the "
         "noise of the mean over periods and 0.1 % of the signal. Relative size is that change "
         "over the one at the detection limit. A verdict is right if it names the true effects "
