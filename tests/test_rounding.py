@@ -29,6 +29,13 @@ def test_the_step_is_read_from_the_record(coarse):
     assert position_step(coarse.recorded) == pytest.approx(STEP, rel=1e-9)
 
 
+def test_the_step_is_read_where_the_lowest_level_has_a_few_counts_only():
+    case = simulate_case({f"{NAME}.resolution_rad": 5e-3}, seed=5, **SHORT)
+    fewest = min(np.unique(r.position).size for r in case.recorded.realizations)
+    assert fewest < 20
+    assert position_step(case.recorded) == pytest.approx(5e-3, rel=1e-9)
+
+
 def test_a_record_with_noise_or_of_few_values_has_no_step():
     fine = simulate_case(seed=5, **SHORT).recorded
     assert position_step(fine) is None

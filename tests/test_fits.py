@@ -1,0 +1,46 @@
+"""Single effects are fitted to their end, wherever they lie between their starts."""
+
+from __future__ import annotations
+
+import pytest
+from gap_cases import SHORT, fitter_of, simulate_case
+
+from gap_diagnosis.attribution import NOTHING_LEFT, tolerated
+
+
+@pytest.mark.parametrize(
+    "sizes",
+    [
+        {"motor_rad": 3e-5, "link_rad": 1e-5},
+        {"motor_rad": 4e-5, "link_rad": 3e-3},
+        {"motor_rad": 0.0, "link_rad": 1e-4},
+        {"motor_rad": 1e-3, "link_rad": 0.0},
+    ],
+)
+def test_presliding_is_found_on_either_side_or_both(sizes):
+    truth = {f"presliding_friction.{name}": value for name, value in sizes.items()}
+    fitter = fitter_of(simulate_case(truth, seed=4, **SHORT))[2]
+    refit = fitter.refit()
+    proposals = fitter.screening(refit, "presliding_friction").proposals()
+    fit = fitter.add(refit, "presliding_friction", proposals)
+    assert refit.held_chi2 / fitter.held.size > 5.0
+    assert fit.converged and fit.held_chi2 / fitter.held.size < 1.3
+    for name, value in truth.items():
+        assert fit.model.effects[name] == pytest.approx(value, rel=0.1, abs=1e-5)
+
+
+def test_an_eccentric_encoder_is_found_though_it_scales_the_parameters_by_a_fifth():
+    truth = {"encoder_eccentricity.amplitude_rad": 0.3, "encoder_eccentricity.phase_rad": 0.8}
+    fitter = fitter_of(simulate_case(truth, seed=4, **SHORT))[2]
+    refit = fitter.refit()
+    effect = "encoder_eccentricity"
+    fit = fitter.add(refit, effect, fitter.screening(refit, effect).proposals())
+    fit = fit if fit.converged else fitter.continued(fit)
+    assert refit.held_chi2 / fitter.held.size > 100.0
+    assert fit.converged and fit.held_chi2 / fitter.held.size < 1.3
+    assert fit.model.effects["encoder_eccentricity.amplitude_rad"] == pytest.approx(0.3, rel=0.2)
+
+
+def test_what_an_explanation_may_leave_grows_with_what_the_refit_leaves():
+    assert tolerated(0.7) == tolerated(1.0) == NOTHING_LEFT
+    assert tolerated(21.0) == pytest.approx(3.0)
