@@ -25,7 +25,7 @@ NOTHING_LEFT = 2.0
 """Held-out misfit per degree of freedom below which nothing is left to explain."""
 PLAIN = 4.0
 """The same for the refit alone, where no effect gains anything."""
-FORM_ERROR = 0.05
+FORM_ERROR = 0.06
 """Share of the refit's misfit beyond noise that a right explanation may leave: a rig's law is never
 exactly the catalogue's."""
 TIE = 0.5

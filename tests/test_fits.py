@@ -43,4 +43,4 @@ def test_an_eccentric_encoder_is_found_though_it_scales_the_parameters_by_a_fift
 
 def test_what_an_explanation_may_leave_grows_with_what_the_refit_leaves():
     assert tolerated(0.7) == tolerated(1.0) == NOTHING_LEFT
-    assert tolerated(21.0) == pytest.approx(3.0)
+    assert tolerated(51.0) == pytest.approx(5.0)
