@@ -25,9 +25,11 @@ NOTHING_LEFT = 2.0
 """Held-out misfit per degree of freedom below which nothing is left to explain."""
 PLAIN = 4.0
 """The same for the refit alone, where no effect gains anything."""
-FORM_ERROR = 0.06
-"""Share of the refit's misfit beyond noise that a right explanation may leave: a rig's law is never
-exactly the catalogue's."""
+STANDS_OUT = 40.0
+"""An explanation that leaves more must stand out: the refit's misfit beyond noise over its own,
+times the next explanation's misfit over its own. A rig's law is never exactly the catalogue's, so a
+right one may leave a lot; what only substitutes for an unknown effect has others nearly as good
+(at most 18 on training cases, right ones at least 90)."""
 TIE = 0.5
 """Explanations can't be told apart if their misfits differ by less than this share of what even
 the best leaves beyond noise: so much the model's own form may be wrong."""
@@ -75,11 +77,6 @@ class Attribution:
     explained: bool
 
 
-def tolerated(refit: float) -> float:
-    """Return the misfit that an explanation may leave, by that of the refit."""
-    return NOTHING_LEFT + FORM_ERROR * max(refit - _NOTHING, 0.0)
-
-
 def _partners(found: Sequence[str], among: set[str]) -> list[str]:
     """Return the near equivalents of effects, so that a set is never short of one not tried."""
     groups = [group for group in NEAR_EQUIVALENTS if group & set(found)]
@@ -90,6 +87,17 @@ def _stands_for(effects: Sequence[str], others: Sequence[str]) -> bool:
     """Tell whether explanations differ by one effect and a near equivalent of it."""
     mine, theirs = set(effects) - set(others), set(others) - set(effects)
     return len(mine) == 1 and bool(_partners(sorted(theirs), mine))
+
+
+def stands_out(left: float, refit: float, rival: float) -> float:
+    """Return by how much an explanation beats refit and next explanation, multiplied.
+
+    Args:
+        left: its misfit per degree of freedom, above 1.
+        refit: that of the refit.
+        rival: that of the next explanation.
+    """
+    return (refit - _NOTHING) / (left - _NOTHING) * rival / left
 
 
 class Search:
@@ -205,9 +213,25 @@ class Search:
         return certain and min(before / after, simple.train_chi2 / rich.train_chi2) > gain
 
     def _explains(self, refit: Fit, best: Fit) -> bool:
+        left = self.misfit(best)
         if not best.effects:
-            return self.misfit(best) < PLAIN
-        return self.misfit(best) < tolerated(self.misfit(refit))
+            return left < PLAIN
+        if left < NOTHING_LEFT:
+            return True
+        return stands_out(left, self.misfit(refit), self._next(refit, best)) > STANDS_OUT
+
+    def _next(self, refit: Fit, best: Fit) -> float:
+        """Return the misfit of the best explanation that does not stand for the chosen one.
+
+        A fit that was given up counts as well: it could only have become better.
+        """
+        alike = {*best.effects, *_partners(best.effects, set(self._fitter.catalogue))}
+        others = [
+            fit
+            for fit in self._fits.values()
+            if len(fit.effects) == len(best.effects) and not set(fit.effects) <= alike
+        ]
+        return min(self.misfit(fit) for fit in (refit, *others))
 
     def _effects_needed(self, best: Fit) -> int:
         """Search forward, backward and by swaps for a second effect; return how many to name."""

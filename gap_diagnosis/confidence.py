@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from typing import Literal
 
-from .attribution import tolerated
 from .diagnosis import Candidate, Diagnosis
 
 Group = Literal["named", "nothing", "abstained", "gate"]
@@ -27,7 +26,7 @@ NAMES: dict[Group, tuple[str, ...]] = {
     "named": ("intercept", "lead over what is not in the set", "misfit left", "second effect",
               "ambiguous"),
     "nothing": ("intercept", "gain of the best effect"),
-    "abstained": ("intercept", "misfit left over what counts as explained", "gain of the best"),
+    "abstained": ("intercept", "misfit left", "gain of the best"),
     "gate": ("intercept",),
 }  # fmt: skip
 _MOST = 3.0  # features are logarithms, of which more than this says no more
@@ -60,7 +59,7 @@ def features(diagnosis: Diagnosis) -> tuple[float, ...]:
     if kind == "nothing":
         return 1.0, _log(refit / best)
     if kind == "abstained":
-        return 1.0, _log(left / tolerated(refit)), _log(refit / best)
+        return 1.0, _log(left), _log(refit / best)
     lead = min((_floored(c) for c in ranked if not _in_set(c, diagnosis)), default=refit) / left
     second = float(len(diagnosis.effects) > 1)
     return 1.0, _log(lead), _log(left), second, float(diagnosis.verdict == "ambiguous")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from gap_cases import SHORT, fitter_of, simulate_case
 
-from gap_diagnosis.attribution import NOTHING_LEFT, tolerated
+from gap_diagnosis.attribution import STANDS_OUT, stands_out
 
 
 @pytest.mark.parametrize(
@@ -41,6 +41,15 @@ def test_an_eccentric_encoder_is_found_though_it_scales_the_parameters_by_a_fift
     assert fit.model.effects["encoder_eccentricity.amplitude_rad"] == pytest.approx(0.3, rel=0.2)
 
 
-def test_what_an_explanation_may_leave_grows_with_what_the_refit_leaves():
-    assert tolerated(0.7) == tolerated(1.0) == NOTHING_LEFT
-    assert tolerated(51.0) == pytest.approx(5.0)
+@pytest.mark.parametrize(
+    ("left", "refit", "rival", "out"),
+    [
+        (10.0, 300.0, 280.0, True),  # another form of the catalogue's law
+        (9.0, 350.0, 19.0, True),  # next comes the same effect on the other side
+        (6.5, 55.0, 10.0, False),  # one of several substitutes
+        (70.0, 770.0, 200.0, False),
+        (2.1, 3.7, 2.9, False),
+    ],
+)
+def test_an_explanation_that_leaves_a_lot_must_stand_out(left, refit, rival, out):
+    assert (stands_out(left, refit, rival) > STANDS_OUT) is out
