@@ -185,7 +185,7 @@ def _judge(
         ranking=[_candidate(fit, size, refit, groups) for fit in attribution.candidates],
         parameters=estimates(shown, groups),
         next_experiment=_next(recorded, noise, attribution, verdict),
-        notes=_notes(gates, attribution, misfits, verdict),
+        notes=_notes(gates, attribution, misfits, verdict, fitter.nominal, fitter.tolerance),
     )
     return diagnosis.model_copy(update={"confidence": confidence(diagnosis)})
 
@@ -299,7 +299,12 @@ def _candidate(fit: Fit, size: int, refit: Fit, groups: np.ndarray) -> Candidate
 
 
 def _notes(
-    gates: GateReport, attribution: Attribution, misfits: Mapping[str, float], verdict: Verdict
+    gates: GateReport,
+    attribution: Attribution,
+    misfits: Mapping[str, float],
+    verdict: Verdict,
+    nominal: Mapping[str, float],
+    tolerance: float,
 ) -> list[str]:
     notes = [gate.sentence for gate in gates.failures] + list(gates.notes)
     failed = [" + ".join(fit.effects) for fit in attribution.candidates if not fit.converged]
@@ -313,4 +318,11 @@ def _notes(
         )
     if verdict == "parameters_only":
         notes.append("A torque-constant error is equivalent to scaling all parameters.")
+        found = attribution.refit.model.plant
+        far = [n for n, v in found.items() if abs(v - nominal[n]) > tolerance * abs(nominal[n])]
+        if len(far) > len(found) // 2:
+            notes.append(
+                f"{', '.join(far)} lie beyond the tolerance of the nominal file: look for a gain, "
+                "of the torque or of the encoder (an eccentric one has one about its zero)."
+            )
     return notes

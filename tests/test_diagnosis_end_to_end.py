@@ -136,3 +136,18 @@ def test_unseen_bags_of_the_same_rig_have_no_gap_to_the_updated_parameters(bare)
     found = investigate(again.recorded, nominal)
     assert found.diagnosis.verdict == "no_gap"
     assert folder.exists()
+
+
+def test_parameters_that_a_gain_scales_are_said_to_lie_beyond_the_tolerance():
+    case = simulate_case({"torque_gain.relative_error": -0.25}, seed=SEED, off=0.0, **SHORT)
+    diagnosis = investigate(case.recorded, PLANT.defaults()).diagnosis
+    assert diagnosis.verdict == "parameters_only"
+    note = next(note for note in diagnosis.notes if "beyond the tolerance" in note)
+    assert "jm, j, fs, fsm, fv, fvm, k0" in note and "gain" in note
+    assert diagnosis.parameters["k0"].value == pytest.approx(
+        PLANT.defaults()["k0"] / 0.75, rel=0.02
+    )
+
+
+def test_parameters_within_the_tolerance_have_no_such_note(bare):
+    assert not [note for note in bare[2].notes if "beyond the tolerance" in note]
