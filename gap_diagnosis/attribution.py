@@ -46,6 +46,7 @@ _FINALISTS = 4
 _CLOSE = 2.0
 _GIVE_UP = 4.0
 _NEAR = 10.0
+_ALIKE = 1.3  # near equivalents that fit worse than this are looked for again from each other
 _NOTHING = 1.0  # misfit per degree of freedom that noise alone leaves
 _WORTH_A_PAIR = 2.0
 _WORTH_A_HARMONIC = 1.3
@@ -153,6 +154,7 @@ class Search:
         parent: Fit,
         effects: Sequence[str],
         most: int | None = None,
+        near: float = _NEAR,
     ) -> None:
         """Fit the parent with each effect more, in the order of what their starts achieve.
 
@@ -160,10 +162,12 @@ class Search:
             parent: the explanation to extend.
             effects: identifiers to add, one at a time.
             most: how many of them to pursue; None for all.
+            near: how many times the best chi-square a converged fit may have to be left alone.
         """
         rivals = [fit.train_chi2 for fit in self._ranked(len(parent.effects) + 1)]
         least = min(parent.train_chi2, *rivals) if rivals else parent.train_chi2
-        effects = [e for e in effects if not self._settled(tuple(sorted((*parent.effects, e))))]
+        settled = self._settled(len(parent.effects) + 1, near)
+        effects = [e for e in effects if tuple(sorted((*parent.effects, e))) not in settled]
         screened = {effect: self._fitter.screening(parent, effect) for effect in effects}
         hopeful = sorted(effects, key=lambda effect: -screened[effect].gain)
         if most is not None:
@@ -257,15 +261,13 @@ class Search:
         for kept, swapped in (pairs[0].effects, pairs[0].effects[::-1]):
             partners = _partners([swapped], set(self._fitter.catalogue) - {kept, swapped})
             if partners:
-                self._extend(self._fitter.without(pairs[0], swapped), partners)
+                self._extend(self._fitter.without(pairs[0], swapped), partners, near=_ALIKE)
 
-    def _settled(self, effects: tuple[str, ...]) -> bool:
-        """Whether a fit of these effects has converged and another start could not help."""
-        fit = self._fits.get(effects)
-        if fit is None or not fit.converged:
-            return False
-        best = min(f.train_chi2 for f in self._ranked(len(effects)))
-        return fit.train_chi2 < _NEAR * best
+    def _settled(self, count: int, near: float) -> set[tuple[str, ...]]:
+        """Return which explanations of `count` effects another start could not help."""
+        ranked = self._ranked(count)
+        best = min((fit.train_chi2 for fit in ranked), default=math.inf)
+        return {fit.effects for fit in ranked if fit.train_chi2 < near * best}
 
     def _polish(self, count: int) -> None:
         """Take fits further that have not converged but would lead, or stand for what leads."""

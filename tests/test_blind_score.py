@@ -32,6 +32,8 @@ def outcome(kind: str, true: list[Effect], verdict: str, named: tuple[str, ...] 
 
 LAG, GAP = effect("actuator_lag"), effect("backlash")
 FAINT = effect("actuator_lag", 0.5)
+COULOMB = effect("asymmetric_friction", **{"asymmetric_friction.coulomb_nm": 1.0})
+PAIR = ("backlash", "torque_bias")
 
 
 @pytest.mark.parametrize(
@@ -53,6 +55,8 @@ FAINT = effect("actuator_lag", 0.5)
         ("single", [effect("piecewise_stiffness")], "effect", ("backlash",), None, False),
         ("two", [LAG, GAP], "effect", ("backlash", "actuator_lag"), None, True),
         ("two", [LAG, GAP], "effect", ("backlash",), None, False),
+        ("two", [GAP, COULOMB], "ambiguous", PAIR, [[PAIR[0]], [PAIR[1], "gravity"]], True),
+        ("two", [GAP, LAG], "ambiguous", PAIR, [[PAIR[0]], [PAIR[1], "gravity"]], False),
         ("outside", [effect("drive_dead_band")], "unexplained", (), None, True),
         ("outside", [effect("drive_dead_band")], "effect", ("backlash",), None, False),
         ("nonstationary", [effect("nonstationary")], "nonstationary", (), None, True),

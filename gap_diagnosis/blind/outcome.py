@@ -130,7 +130,7 @@ class Outcome:
         if self.kind == "nonstationary":
             return self.verdict == "nonstationary" or self.named == ("nonstationary",)
         if self.verdict == "ambiguous":
-            return set(self.truth) <= self.reported
+            return all(indistinguishable(e) & self.reported for e in self.answer.effects)
         if self.kind == "two":
             return self.matches == len(self.truth) == len(self.named)
         return self.first and len(self.named) == 1
