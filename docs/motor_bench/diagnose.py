@@ -17,7 +17,7 @@ from gap_diagnosis.misfit import Misfit
 from gap_diagnosis.model import Model, Simulator
 from gap_diagnosis.records import Realization, RecordedExperiment, read_experiment, spectrum
 
-TOLERANCE = 20.0  # friction is not known at all: every value may be a factor of forty off
+TOLERANCE = 2.3  # friction is not known at all: every value may be a factor of sixty off
 BANDS = ((11, 40), (40, 60), (60, 90), (90, 150), (150, 250))
 
 
