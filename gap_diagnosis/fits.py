@@ -236,15 +236,12 @@ class Fitter:
         for effect in fit.effects:
             if effect not in RIPPLES or f"{effect}.second_ratio" in fit.space.effects:
                 continue
-            for space, point, known in (
-                *self._second_harmonics(fit, effect),
-                *self._two_harmonics(fit, effect),
-            ):
+            found = [*self._second_harmonics(fit, effect), *self._two_harmonics(fit, effect)]
+            for space, point, known in found:
                 worth = _WORTH_A_HARMONIC * fit.train_chi2
                 richer = self._solve(fit.effects, space, point, worth, known=known)
                 if richer.converged and richer.train_chi2 < worth:
                     fit = richer
-                    break
         return fit
 
     def _second_harmonics(self, fit: Fit, effect: str) -> list[_Start]:

@@ -19,6 +19,7 @@ Residuals = Callable[[np.ndarray], np.ndarray]
 _STEP = 1e-6  # a loop near its stability margin bends within 1e-4 already
 _DAMPINGS = np.array([1.0, 1e2])  # tried at once, times the present damping
 _LEAST_DAMPING, _MOST_DAMPING = 1e-7, 1e6
+_FRESH_DAMPING, _MUCH_DAMPING = 1.0, 1e2  # first tried with a fresh Jacobian; small steps beyond
 _SMALL_GAIN = 1e-3
 _GOOD, _POOR = 0.7, 0.3  # gain over the gain that the linear model promises
 _PATIENCE, _STILL_FALLING = 3, 0.8
@@ -127,7 +128,7 @@ class _Search:
                 return not self.converged
             if self._updates:
                 self._updates = None
-            elif self._damping >= _MOST_DAMPING or self._small:
+            elif self._damping >= (_MUCH_DAMPING if self._small else _MOST_DAMPING):
                 self.converged = True
                 return False
             else:
@@ -162,6 +163,7 @@ class _Search:
         first = 0 if known is None else known.shape[1]
         size = _STEP * np.maximum(np.abs(self.x), 1.0)
         steps = np.where(self.x + size <= self._high, size, -size)
+        self._damping = min(self._damping, _FRESH_DAMPING)
         self._updates = 0 if known is None else 1
         if known is not None:
             self.jacobian[:, :first] = known

@@ -17,11 +17,12 @@ from fjr_sim_node import effects as fx
 
 from .least_squares import Solution
 from .model import Model
-from .search_space import Space
+from .search_space import Space, beside
 
 _SIZES = (0.1, 0.3, 3.0)  # of the size that the linear prediction asks for, tried after that
 _TRIED = 6
 _SCALED = 2
+_FOLLOW = 0.1  # how far a parameter of the parent may follow, relative
 
 Errors = Callable[[Sequence[Model]], np.ndarray]
 Proposal = tuple[float, Space, np.ndarray]
@@ -58,7 +59,7 @@ class Screening:
             space_of: the space in which a seed is fitted.
             errors: error vectors of models, as the parent's residuals.
         """
-        changes = errors([model.with_effects(seed) for seed in seeds]) - parent.residuals
+        changes = errors([beside(model, seed) for seed in seeds]) - parent.residuals
         inverse = np.linalg.pinv(parent.jacobian, rcond=1e-6)
         own = changes - (changes @ inverse.T) @ parent.jacobian.T
         found = _candidates(parent, seeds, changes, own)
@@ -128,9 +129,13 @@ class _Tries:
         return self._spaces[id(candidate)]
 
     def _point(self, candidate: _Candidate, size: float) -> np.ndarray:
-        space = self._space(candidate)
-        start = space.point(self._model.with_effects(candidate.seed))
-        return _scaled(self._parent, self._inverse, space, start, candidate.change, size)
+        """Return the seed with its sizes scaled, the parent's parameters following."""
+        space, parents = self._space(candidate), self._parent.x.size
+        seed = {n: v * size if _scales(n) else v for n, v in candidate.seed.items()}
+        point = space.point(beside(self._model, seed))
+        follow = self._inverse @ -(self._parent.residuals + size * candidate.change)
+        point[:parents] += np.clip(follow, -_FOLLOW, _FOLLOW)
+        return np.clip(point, *space.bounds())
 
 
 def _candidates(
@@ -185,6 +190,10 @@ def _may_be_negative(seed: Mapping[str, float]) -> bool:
 _LOW = {parameter.name: parameter.low for parameter in fx.PARAMETERS}
 
 
+def _scales(name: str) -> bool:
+    return is_size(name) and name != "torque_saturation.limit_nm"
+
+
 def is_size(name: str) -> bool:
     """Tell whether a parameter, by its full name, is a size of its effect."""
     effect, parameter = name.split(".", 1)
@@ -192,22 +201,3 @@ def is_size(name: str) -> bool:
         return True
     description = fx.EFFECTS[effect]
     return parameter in {p.name for p in description.parameters[: description.sizes]}
-
-
-def _scaled(
-    parent: Solution,
-    inverse: np.ndarray,
-    space: Space,
-    start: np.ndarray,
-    change: np.ndarray,
-    size: float,
-) -> np.ndarray:
-    """Return the start with its sizes scaled and the parent's parameters following."""
-    out = start.copy()
-    parents = parent.x.size
-    follow = inverse @ -(parent.residuals + size * change)
-    out[:parents] = parent.x + np.clip(follow, -0.1, 0.1)
-    for index, name in enumerate(space.effects[parents - len(space.nominal) :]):
-        if is_size(name) and name != "torque_saturation.limit_nm":
-            out[parents + index] *= size
-    return np.clip(out, *space.bounds())

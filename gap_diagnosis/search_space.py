@@ -31,6 +31,8 @@ _SHARES = (0.15, 0.25, 0.4, 0.5, 0.6, 0.7, 0.75, 0.8, 0.85, 0.9, 0.94, 0.97, 1.0
 """Torque limits over the greatest commanded torque: which peaks are clipped changes from one to
 the next, and a knee is felt below its limit."""
 
+_LEAST_LINK = 0.4  # of its inertia that a third mass leaves it at a start
+
 STARTS: dict[str, tuple[dict[str, tuple[float, ...]], ...]] = {
     "stribeck_friction_motor": ({"torque_nm": (0.3, 2.0), "velocity_rad_s": (0.02, 0.1, 0.5)},),
     "stribeck_friction_link": ({"torque_nm": (0.3, 2.0), "velocity_rad_s": (0.02, 0.1, 0.5)},),
@@ -135,6 +137,17 @@ def starts(
             names = (f"{effect}.{name}" for name in grid)
             points.append(dict(zip(names, values, strict=True)))
     return points
+
+
+def beside(model: Model, seed: Mapping[str, float]) -> Model:
+    """Return a model with a starting point of an effect more.
+
+    A third mass is taken from the link: what low lines see is the sum.
+    """
+    mass = seed.get("extra_mode.inertia_kg_m2", 0.0)
+    left = max(model.plant.get("j", 0.0) - mass, _LEAST_LINK * model.plant.get("j", 0.0))
+    plant = {**model.plant, "j": left} if mass else model.plant
+    return Model(plant, {**model.effects, **seed})
 
 
 @dataclass(frozen=True)

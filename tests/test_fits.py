@@ -41,6 +41,18 @@ def test_an_eccentric_encoder_is_found_though_it_scales_the_parameters_by_a_fift
     assert fit.model.effects["encoder_eccentricity.amplitude_rad"] == pytest.approx(0.3, rel=0.2)
 
 
+@pytest.mark.parametrize(("inertia", "hz"), [(0.1, 39.0), (0.05, 20.0), (0.005, 30.0)])
+def test_a_heavy_or_a_light_third_mass_is_found(inertia, hz):
+    values = {"inertia_kg_m2": inertia, "frequency_hz": hz, "damping_ratio": 0.017}
+    truth = {f"extra_mode.{name}": value for name, value in values.items()}
+    fitter = fitter_of(simulate_case(truth, seed=4, **SHORT))[2]
+    refit = fitter.refit()
+    fit = fitter.add(refit, "extra_mode", fitter.screening(refit, "extra_mode").proposals())
+    assert refit.held_chi2 / fitter.held.size > 5.0
+    assert fit.converged and fit.held_chi2 / fitter.held.size < 1.3
+    assert fit.model.effects["extra_mode.inertia_kg_m2"] == pytest.approx(inertia, rel=0.05)
+
+
 @pytest.mark.parametrize(
     ("left", "refit", "rival", "out"),
     [
