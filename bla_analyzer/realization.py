@@ -202,22 +202,27 @@ def period_mismatch(sums: PeriodSums, lines: Lines) -> Mismatch:
 
 
 def unsettled(
-    discarded: np.ndarray | None, first: np.ndarray, previous: np.ndarray, last: np.ndarray
+    discarded: np.ndarray | None,
+    first: np.ndarray,
+    previous: np.ndarray,
+    last: np.ndarray,
+    step: float = 0.0,
 ) -> float:
     """Return the rms of a transient still present, over rms of y.
 
     A transient decays: it is sought where the first kept period begins and, as that period
     continues the discarded one, where the discarded one ends. Each difference from the last period
     counts only above twice the power that the last two periods differ by (in the noisiest tenth of
-    their second half), which noise does not reach.
+    their second half), which noise does not reach, and above one step of a coarse encoder.
 
     Args:
         discarded: y of the last discarded period, (N,); None if there is none.
         first: y of the first kept period, (N,).
         previous: y of the last but one, (N,).
         last: y of the last, (N,).
+        step: of the encoder; a difference of one step is no transient.
     """
-    floor = 2.0 * _tenths(previous - last)[SEGMENTS // 2 :].max()
+    floor = 2.0 * max(_tenths(previous - last)[SEGMENTS // 2 :].max(), 0.5 * step**2)
     excess = _tenths(first - last)[0] - floor
     if discarded is not None:
         excess = max(excess, _tenths(discarded - last)[-1] - floor)

@@ -18,6 +18,7 @@ from .model import Model, Simulator
 from .noise import ONE_PERIOD, NoiseLevels, noise_levels
 from .prediction import loses
 from .records import Realization, RecordedExperiment
+from .rounding import position_step
 from .stationarity import (
     BAG_Z_LIMIT,
     MISFIT_WITHOUT_STRUCTURE,
@@ -235,11 +236,13 @@ def _periodic(recorded: RecordedExperiment) -> Gate:
 
 
 def _settled(recorded: RecordedExperiment) -> Gate:
+    step = position_step(recorded) or 0.0
+
     def left(r: Realization) -> float:
         kept = r.kept(r.position)
         before = r.position[r.experiment.transient_periods - 1]
         discarded = before if r.experiment.transient_periods else None
-        return unsettled(discarded, kept[0], kept[-2], kept[-1])
+        return unsettled(discarded, kept[0], kept[-2], kept[-1], step)
 
     if recorded.experiment.periods < 2:
         return _untested("transient decayed", "two periods or more")

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from gap_cases import simulate_case
 
+from bla_analyzer.checks import TRANSIENT_LIMIT
+from bla_analyzer.realization import unsettled
 from fjr_sim_node.plant import PLANT
 from gap_diagnosis.attribution import Attribution
 from gap_diagnosis.fits import Fitter
@@ -34,6 +36,17 @@ def test_the_step_is_read_where_the_lowest_level_has_a_few_counts_only():
     fewest = min(np.unique(r.position).size for r in case.recorded.realizations)
     assert fewest < 20
     assert position_step(case.recorded) == pytest.approx(5e-3, rel=1e-9)
+
+
+def test_rounding_that_locks_in_some_periods_is_no_transient():
+    rng = np.random.default_rng(2)
+    period = np.sin(2 * np.pi * np.arange(2000) / 2000)
+    last = np.round(period / 0.2) * 0.2
+    first = np.round((period + rng.uniform(-0.1, 0.1, 2000)) / 0.2) * 0.2
+    assert unsettled(None, first, last, last) > TRANSIENT_LIMIT
+    assert unsettled(None, first, last, last, 0.2) == 0.0
+    decaying = last + np.exp(-np.arange(2000) / 200)
+    assert unsettled(None, decaying, last, last, 0.2) > TRANSIENT_LIMIT
 
 
 def test_a_record_with_noise_or_of_few_values_has_no_step():
