@@ -222,7 +222,7 @@ def unsettled(
         last: y of the last, (N,).
         step: of the encoder; a difference of one step is no transient.
     """
-    floor = 2.0 * max(_tenths(previous - last)[SEGMENTS // 2 :].max(), 0.5 * step**2)
+    floor = max(2.0 * _tenths(previous - last)[SEGMENTS // 2 :].max(), step**2)
     excess = _tenths(first - last)[0] - floor
     if discarded is not None:
         excess = max(excess, _tenths(discarded - last)[-1] - floor)
