@@ -2,7 +2,8 @@
 
 A seed is a small effect of one shape. Where it should go, with the base parameters following, is
 predicted linearly (score test with the parent's Jacobian); the prediction is then tried at several
-sizes, because neither smallness nor linearity can be relied on. Seeds that differ only in a phase
+sizes, and the seed with the parameters as they are, because neither smallness nor linearity can be
+relied on. Seeds that differ only in a phase
 by a quarter turn span all phases: their best combination is a seed of its own.
 """
 
@@ -79,6 +80,7 @@ class Screening:
         """
         chosen = self._candidates[:_TRIED]
         self._tries.run([(c, size) for c in chosen for size in sorted({c.size, 1.0})])
+        self._tries.run([(c, 1.0) for c in chosen], follow=False)
         best = self._tries.best(_SCALED)
         self._tries.run([(c, c.size * factor) for c in best for factor in _SIZES])
         return self._tries.proposals()
@@ -100,12 +102,12 @@ class _Tries:
         self._spaces: dict[int, Space] = {}
         self._found: list[tuple[float, _Candidate, np.ndarray]] = []
 
-    def run(self, tries: Sequence[tuple[_Candidate, float]]) -> None:
-        """Evaluate candidates at sizes, the base parameters following."""
+    def run(self, tries: Sequence[tuple[_Candidate, float]], follow: bool = True) -> None:
+        """Evaluate candidates at sizes, the base parameters following or as they were."""
         tries = [(c, size) for c, size in tries if 1e-3 < abs(size) < 30.0]
         if not tries:
             return
-        points = [self._point(candidate, size) for candidate, size in tries]
+        points = [self._point(candidate, size, follow) for candidate, size in tries]
         trials = self._errors(
             [self._space(c).model(p) for (c, _), p in zip(tries, points, strict=True)]
         )
@@ -128,13 +130,14 @@ class _Tries:
             self._spaces[id(candidate)] = self._space_of(candidate.seed)
         return self._spaces[id(candidate)]
 
-    def _point(self, candidate: _Candidate, size: float) -> np.ndarray:
-        """Return the seed with its sizes scaled, the parent's parameters following."""
+    def _point(self, candidate: _Candidate, size: float, follow: bool) -> np.ndarray:
+        """Return the seed with its sizes scaled and, if they follow, the parent's parameters."""
         space, parents = self._space(candidate), self._parent.x.size
         seed = {n: v * size if _scales(n) else v for n, v in candidate.seed.items()}
         point = space.point(beside(self._model, seed))
-        follow = self._inverse @ -(self._parent.residuals + size * candidate.change)
-        point[:parents] += np.clip(follow, -_FOLLOW, _FOLLOW)
+        if follow:
+            step = self._inverse @ -(self._parent.residuals + size * candidate.change)
+            point[:parents] += np.clip(step, -_FOLLOW, _FOLLOW)
         return np.clip(point, *space.bounds())
 
 
@@ -154,7 +157,10 @@ def _candidates(
         gain = -float(weights @ (own[members] @ parent.residuals))
         if len(members) == 1:
             seed, size = seeds[members[0]], float(weights[0])
-            if size < 0.0 and not _may_be_negative(seed):
+            if not any(map(_scales, seed)):
+                after = parent.residuals + own[members[0]]
+                size, gain = 1.0, parent.cost - float(after @ after)
+            elif size < 0.0 and not _may_be_negative(seed):
                 size, gain = 1.0, 0.0
             found.append(_Candidate(seed, changes[members[0]], size, gain))
             continue

@@ -41,6 +41,18 @@ def test_an_eccentric_encoder_is_found_though_it_scales_the_parameters_by_a_fift
     assert fit.model.effects["encoder_eccentricity.amplitude_rad"] == pytest.approx(0.3, rel=0.2)
 
 
+@pytest.mark.parametrize(("share", "knee"), [(1.15, 0.3), (1.0, 0.1), (0.85, 0.0), (0.6, 0.2)])
+def test_a_drive_limit_is_found_even_if_only_its_knee_is_reached(share, knee):
+    bare = fitter_of(simulate_case(seed=4, **SHORT))[2]
+    limit = share * bare.peak_torque_nm
+    truth = {"torque_saturation.limit_nm": limit, "torque_saturation.knee": knee}
+    fitter = fitter_of(simulate_case(truth, seed=4, **SHORT))[2]
+    refit, effect = fitter.refit(), "torque_saturation"
+    fit = fitter.add(refit, effect, fitter.screening(refit, effect).proposals())
+    assert refit.held_chi2 / fitter.held.size > 2.0
+    assert fit.converged and fit.train_chi2 / fitter.train.size < 1.3
+
+
 @pytest.mark.parametrize(("inertia", "hz"), [(0.1, 39.0), (0.05, 20.0), (0.005, 30.0)])
 def test_a_heavy_or_a_light_third_mass_is_found(inertia, hz):
     values = {"inertia_kg_m2": inertia, "frequency_hz": hz, "damping_ratio": 0.017}
