@@ -111,7 +111,7 @@ FIT_BOUNDS: dict[str, tuple[float, float]] = {
 NEGLIGIBLE: dict[str, float] = {
     "presliding_friction.motor_rad": 2e-6,
     "presliding_friction.link_rad": 2e-6,
-    "actuator_lag.time_constant_s": 2e-5,
+    "actuator_lag.time_constant_s": 5e-6,
 }
 """Sizes below which an effect counts as off, since it would only make the plant stiff."""
 
