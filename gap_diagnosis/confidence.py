@@ -2,8 +2,8 @@
 
 One regression for each kind of verdict, on a few figures of the ranking. The coefficients are not
 set by hand: `gap_diagnosis.blind.calibrate` fits them to blind cases whose answers are open, and
-prints this table. They were fitted to the 240 cases of the seeds 102 (48), 103 (72) and 105 (120), the
-last before what they showed was mended; so few were missed that the prior still counts.
+prints this table. They were fitted to the 240 cases of the seeds 102 (48), 103 (72) and 105 (120),
+the last before what they showed was mended; so few were missed that the prior still counts.
 """
 
 from __future__ import annotations
