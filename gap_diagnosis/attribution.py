@@ -29,7 +29,8 @@ STANDS_OUT = 40.0
 """An explanation that leaves more must stand out: the refit's misfit beyond noise over its own,
 times the next explanation's misfit over its own. A rig's law is never exactly the catalogue's, so a
 right one may leave a lot; what only substitutes for an unknown effect has others nearly as good
-(at most 18 on training cases, right ones at least 90)."""
+(at most 18 on the training cases it was set by, right ones at least 90; one later substitute, a
+ripple of the torque constant that goes for cogging, passed)."""
 TIE = 0.5
 """Explanations can't be told apart if their misfits differ by less than this share of what even
 the best leaves beyond noise: so much the model's own form may be wrong."""

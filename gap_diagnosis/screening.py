@@ -3,8 +3,8 @@
 A seed is a small effect of one shape. Where it should go, with the base parameters following, is
 predicted linearly (score test with the parent's Jacobian); the prediction is then tried at several
 sizes, and the seed with the parameters as they are, because neither smallness nor linearity can be
-relied on. Seeds that differ only in a phase
-by a quarter turn span all phases: their best combination is a seed of its own.
+relied on. Seeds that differ only in a phase by a quarter turn span all phases: their best
+combination is a seed of its own.
 """
 
 from __future__ import annotations
