@@ -18,6 +18,7 @@ from gap_diagnosis.fits import Fitter
 from gap_diagnosis.model import Model, Simulator
 from gap_diagnosis.noise import noise_levels
 from gap_diagnosis.records import Realization, RecordedExperiment
+from gap_diagnosis.search_space import TOLERANCE
 
 LEVELS_RAD = (2e-3, 7e-3, 2e-2)
 NOISE_RAD = 2e-5
@@ -126,9 +127,12 @@ def write_bags(case: Case, folder: Path) -> Path:
     return folder
 
 
-def fitter_of(case: Case) -> tuple[RecordedExperiment, Simulator, Fitter]:
+def fitter_of(
+    case: Case, tolerance: float = TOLERANCE
+) -> tuple[RecordedExperiment, Simulator, Fitter]:
     """Return what fits a case of two levels of two realizations from the paper's values."""
     recorded, simulator = case.recorded, Simulator(case.recorded)
     noise = noise_levels(recorded).of_outputs(recorded)
     nominal = Model.nominal(PLANT.defaults()).plant
-    return recorded, simulator, Fitter(recorded, simulator, noise, nominal, (0, 2), (1, 3))
+    fitter = Fitter(recorded, simulator, noise, nominal, (0, 2), (1, 3), tolerance)
+    return recorded, simulator, fitter

@@ -24,6 +24,8 @@ def fitted(truth: dict[str, float], effect: str, more: bool = False) -> tuple[Fi
     (2e-3, 33.0, 0.02),
     (1e-2, 12.0, 0.03),
     (3e-2, 46.0, 0.045),
+    (5e-2, 20.0, 0.017),
+    (1e-1, 39.0, 0.017),
 ])  # fmt: skip
 def test_a_third_mass_is_found_light_and_narrow_or_heavy(inertia, frequency, damping):
     truth = {
@@ -34,6 +36,7 @@ def test_a_third_mass_is_found_light_and_narrow_or_heavy(inertia, frequency, dam
     fit, left = fitted(truth, "extra_mode")
     assert fit.converged and left < 1.5
     assert fit.model.effects["extra_mode.frequency_hz"] == pytest.approx(frequency, rel=0.01)
+    assert fit.model.effects["extra_mode.inertia_kg_m2"] == pytest.approx(inertia, rel=0.05)
 
 
 @pytest.mark.parametrize(("share", "knee"), [(0.45, 0.0), (0.7, 0.0), (0.85, 0.15)])
@@ -54,11 +57,57 @@ def test_an_eccentric_encoder_is_followed_along_its_valley():
 
 
 def test_an_effect_that_no_start_shows_is_found_if_a_step_from_there_gains():
-    """An eccentric encoder that errs in gain wants all bare parameters to follow far."""
+    """An eccentric encoder that errs in gain wants all bare parameters beyond their bounds."""
     truth = {"encoder_eccentricity.amplitude_rad": 0.2, "encoder_eccentricity.phase_rad": 0.05}
-    fitter = fitter_of(simulate_case(truth, seed=1, noise_rad=2.8e-3, **SHORT))[2]
+    case = simulate_case(truth, seed=1, noise_rad=2.8e-3, **SHORT)
+    fitter = fitter_of(case, tolerance=0.03)[2]
     refit = fitter.refit()
     proposals = fitter.screening(refit, "encoder_eccentricity").proposals()
     assert proposals[0][0] > refit.train_chi2
     fit = fitter.add(refit, "encoder_eccentricity", proposals)
     assert fit.converged and fit.held_chi2 / fitter.held.size < 1.5
+
+
+@pytest.mark.parametrize(
+    "sizes",
+    [
+        {"motor_rad": 3e-5, "link_rad": 1e-5},
+        {"motor_rad": 4e-5, "link_rad": 3e-3},
+        {"motor_rad": 0.0, "link_rad": 1e-4},
+        {"motor_rad": 1e-3, "link_rad": 0.0},
+    ],
+)
+def test_presliding_is_found_on_either_side_or_both(sizes):
+    truth = {f"presliding_friction.{name}": value for name, value in sizes.items()}
+    fitter = fitter_of(simulate_case(truth, seed=4, **SHORT))[2]
+    refit = fitter.refit()
+    proposals = fitter.screening(refit, "presliding_friction").proposals()
+    fit = fitter.add(refit, "presliding_friction", proposals)
+    assert refit.held_chi2 / fitter.held.size > 5.0
+    assert fit.converged and fit.held_chi2 / fitter.held.size < 1.3
+    for name, value in truth.items():
+        assert fit.model.effects[name] == pytest.approx(value, rel=0.1, abs=1e-5)
+
+
+def test_an_eccentric_encoder_is_found_though_it_scales_the_parameters_by_a_fifth():
+    truth = {"encoder_eccentricity.amplitude_rad": 0.3, "encoder_eccentricity.phase_rad": 0.8}
+    fitter = fitter_of(simulate_case(truth, seed=4, **SHORT))[2]
+    refit = fitter.refit()
+    effect = "encoder_eccentricity"
+    fit = fitter.add(refit, effect, fitter.screening(refit, effect).proposals())
+    fit = fit if fit.converged else fitter.continued(fit)
+    assert refit.held_chi2 / fitter.held.size > 100.0
+    assert fit.converged and fit.held_chi2 / fitter.held.size < 1.3
+    assert fit.model.effects["encoder_eccentricity.amplitude_rad"] == pytest.approx(0.3, rel=0.2)
+
+
+@pytest.mark.parametrize(("share", "knee"), [(1.15, 0.3), (1.0, 0.1), (0.6, 0.2)])
+def test_a_drive_limit_is_found_even_if_only_its_knee_is_reached(share, knee):
+    bare = fitter_of(simulate_case(seed=4, **SHORT))[2]
+    limit = share * bare.peak_torque_nm
+    truth = {"torque_saturation.limit_nm": limit, "torque_saturation.knee": knee}
+    fitter = fitter_of(simulate_case(truth, seed=4, **SHORT))[2]
+    refit, effect = fitter.refit(), "torque_saturation"
+    fit = fitter.add(refit, effect, fitter.screening(refit, effect).proposals())
+    assert refit.held_chi2 / fitter.held.size > 2.0
+    assert fit.converged and fit.train_chi2 / fitter.train.size < 1.3
