@@ -12,12 +12,12 @@ BIN := $(VENV)/bin
 ifdef ROS_DISTRO
 RCLPY := installed
 LOCK := requirements-installed-ros.lock
-EXTRAS := dev
+EXTRAS := report,dask,dev
 VENV_OPTIONS := --system-site-packages
 else
 RCLPY := wheels
 LOCK := requirements.lock
-EXTRAS := dev,ros
+EXTRAS := report,dask,dev,ros
 VENV_OPTIONS :=
 endif
 
@@ -43,7 +43,7 @@ demo: $(INSTALLED) ## install everything, run a campaign on the ROS graph, write
 	@$(BIN)/fjr demo
 
 test: $(INSTALLED) ## install everything, run the tests
-	@$(PYTEST) -n 2 --dist loadgroup
+	@$(PYTEST) -n 2 --dist loadfile --no-loadscope-reorder
 
 ws: $(INSTALLED) ## build the ROS packages in ros_ws with colcon, test what was installed
 	@cd ros_ws
@@ -64,9 +64,9 @@ lint: $(INSTALLED) ## check style and types
 lock: ## compile both lock files anew (needs uv)
 	@compile() { uv pip compile --quiet --universal --strip-extras --custom-compile-command 'make lock' "$$@"; }
 	echo 'setuptools>=77' | compile pyproject.toml - --python-version 3.10 \
-	  --extra ros --extra dev --extra bench --output-file requirements.lock
+	  --extra report --extra dask --extra ros --extra dev --extra bench --output-file requirements.lock
 	printf '%s\n' 'setuptools>=77' 'numpy<2' | compile pyproject.toml - --python-version 3.12 \
-	  --extra dev --extra bench --output-file requirements-installed-ros.lock
+	  --extra report --extra dask --extra dev --extra bench --output-file requirements-installed-ros.lock
 	! grep -nE '://|^--' requirements.lock requirements-installed-ros.lock
 
 clean: ## remove .venv and everything that tools left behind

@@ -9,6 +9,8 @@ from pathlib import Path
 SCRIPTS = (
     "batch_simulation",
     "plant_accuracy",
+    "periodicity",
+    "stationarity",
     "bag_reading",
     "analysis",
     "waiting",

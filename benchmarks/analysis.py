@@ -14,11 +14,11 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from machine import describe
 
-from bla_analyzer.robust import robust_bla
-from bla_analyzer.spectra import PeriodSums
+from bla_analyzer.bla.robust import robust_bla
 from controller_node import pd_filtered
 from excitation_node import multisine
-from fjr_sim_node.simulator import SIMULATOR, run_realization
+from fjr_records.spectra import PeriodSums
+from fjr_sim_node.simulation.simulator import SIMULATOR, run_realization
 
 M, P = 7, 2
 

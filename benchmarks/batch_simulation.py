@@ -37,7 +37,8 @@ import machine  # noqa: E402
 from controller_node import pd_filtered  # noqa: E402
 from controller_node.transfer_function import TransferFunction  # noqa: E402
 from excitation_node import multisine  # noqa: E402
-from fjr_sim_node import closed_loop, effects, plant  # noqa: E402
+from fjr_sim_node import effects, plant  # noqa: E402
+from fjr_sim_node.simulation import closed_loop  # noqa: E402
 
 RATE = 1000.0
 AMPLITUDE = 7e-3

@@ -20,12 +20,12 @@ from pathlib import Path
 
 from machine import describe
 
-from fjr_bringup.domain import claimed_domain
-from fjr_bringup.interruption import Interruption
-from fjr_bringup.rehearsal.options import Options, Plan, check_options
-from fjr_bringup.rehearsal.progress import RehearsalProgress
+from fjr_bringup.graph.domain import claimed_domain
+from fjr_bringup.rehearsal.loop_progress import RehearsalProgress
 from fjr_bringup.rehearsal.rehearse import Graph, judged
-from fjr_sim_node.faults import CATALOGUE, CONTINUES, Fault, FaultPlan
+from fjr_bringup.rehearsal.request import Options, Plan, check_options
+from fjr_kit.stopping import Interruption
+from fjr_sim_node.drive.faults import CATALOGUE, CONTINUES, Fault, FaultPlan
 
 EXPERIMENT = {"base_frequency_hz": 1.0, "f_min_hz": 1.0}
 RATE_HZ, DURATION_S = 500.0, 4.0

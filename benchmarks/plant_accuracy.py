@@ -19,7 +19,8 @@ import machine  # noqa: E402
 
 from controller_node import pd_filtered  # noqa: E402
 from excitation_node import multisine  # noqa: E402
-from fjr_sim_node import closed_loop, plant  # noqa: E402
+from fjr_sim_node import plant  # noqa: E402
+from fjr_sim_node.simulation import closed_loop  # noqa: E402
 
 RATE = 1000.0
 CASES = {

@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 from machine import describe
 
-from fjr_bringup.rehearsal.progress import RehearsalProgress
+from fjr_bringup.rehearsal.loop_progress import RehearsalProgress
 from fjr_bringup.rehearsal.timing import Distribution
 
 RATE_HZ = 500.0
@@ -30,8 +30,8 @@ _MOST_PING_PONG_S = 120.0
 
 def loop(duration_s: float) -> bool:
     """Rehearse, print what was measured, and return whether the target is reached."""
-    from fjr_bringup.rehearsal.options import Options
     from fjr_bringup.rehearsal.rehearse import rehearse
+    from fjr_bringup.rehearsal.request import Options
 
     with tempfile.TemporaryDirectory() as folder, RehearsalProgress() as progress:
         overrides = {} if duration_s >= 20.0 else {"excitation": {"base_frequency_hz": 1.0,
@@ -70,9 +70,9 @@ def partner(role: str, duration_s: float) -> None:
     from rclpy.experimental import EventsExecutor
     from sensor_msgs.msg import JointState
 
-    from fjr_interface import ros
-    from fjr_interface.joint_state import JointStateReader, JointStateWriter
+    from fjr_interface.bags.joint_state import JointStateReader, JointStateWriter
     from fjr_interface.real_time import keep_pauses_out
+    from fjr_interface.ros import runtime
 
     rclpy.init()
     node = rclpy.create_node(role)
@@ -80,7 +80,7 @@ def partner(role: str, duration_s: float) -> None:
         JointStateWriter("position", "joint").encode,
         JointStateReader("position").decode,
     )
-    publisher = node.create_publisher(JointState, role, ros.SIGNAL_QOS)
+    publisher = node.create_publisher(JointState, role, runtime.SIGNAL_QOS)
     latencies: list[int] = []
     stopped = False
 
@@ -94,7 +94,7 @@ def partner(role: str, duration_s: float) -> None:
             latencies.append(time.monotonic_ns() - stamp)
 
     other = "pong" if role == "ping" else "ping"
-    reader = node.create_subscription(JointState, other, answer, ros.SIGNAL_QOS, raw=True)
+    reader = node.create_subscription(JointState, other, answer, runtime.SIGNAL_QOS, raw=True)
     while not (publisher.get_subscription_count() and reader.get_publisher_count()):
         time.sleep(0.01)
     executor = EventsExecutor()
@@ -131,7 +131,6 @@ def ping_pong(duration_s: float) -> Distribution:
 def main(minutes: float = 10.0) -> bool:
     """Print the distributions; return whether the target is reached."""
     os.environ.setdefault("ROS_DOMAIN_ID", "76")
-    import fjr_interface.ros  # noqa: F401 keeps discovery on this machine
 
     print(describe() + "\n")
     print(f"{RATE_HZ:g} Hz, {minutes:g} minutes; times in ms\n")

@@ -21,8 +21,8 @@ import tempfile
 import time
 from pathlib import Path
 
-from fjr_bringup.campaign import Campaign
-from fjr_bringup.progress import CampaignProgress
+from fjr_bringup.campaign.plan import Campaign
+from fjr_bringup.campaign.progress import CampaignProgress
 
 SAMPLE_RATE_HZ = 1000.0
 EXCHANGES = 20_000
@@ -44,8 +44,8 @@ def partner(role: str, kind: str) -> None:
     import rclpy
     from sensor_msgs.msg import JointState
 
-    from fjr_interface import ros
-    from fjr_interface.joint_state import JointStateReader, JointStateWriter
+    from fjr_interface.bags.joint_state import JointStateReader, JointStateWriter
+    from fjr_interface.ros import runtime
 
     rclpy.init()
     node = rclpy.create_node(role)
@@ -54,7 +54,7 @@ def partner(role: str, kind: str) -> None:
         JointStateReader("position").decode,
     )
     other = "pong" if role == "ping" else "ping"
-    publisher = node.create_publisher(JointState, role, ros.SIGNAL_QOS)
+    publisher = node.create_publisher(JointState, role, runtime.SIGNAL_QOS)
     count = 0
 
     def send(stamp: int) -> None:
@@ -75,7 +75,9 @@ def partner(role: str, kind: str) -> None:
         if role == "pong" or count < EXCHANGES:
             send(stamp if role == "pong" else stamp + 1_000_000)
 
-    reader = node.create_subscription(JointState, other, answer, ros.SIGNAL_QOS, raw=kind == "raw")
+    reader = node.create_subscription(
+        JointState, other, answer, runtime.SIGNAL_QOS, raw=kind == "raw"
+    )
     while not (publisher.get_subscription_count() and reader.get_publisher_count()):
         time.sleep(0.01)
     if role == "ping":
@@ -117,7 +119,7 @@ class _Stopwatch(CampaignProgress):
 
 def graph(*, composed: bool) -> float:
     """Return how many times real time the graph with its recorder runs; the bag is audited."""
-    from fjr_bringup.graph_run import run_campaign
+    from fjr_bringup.graph.graph_run import run_campaign
 
     excitation = {"realizations": 1, "periods": 4, "sample_rate_hz": SAMPLE_RATE_HZ}
     campaign = Campaign.create(None, {"excitation": excitation})
@@ -130,7 +132,6 @@ def graph(*, composed: bool) -> float:
 def main(rounds: int = 3) -> bool:
     """Print all figures; return whether the targets are reached."""
     os.environ.setdefault("ROS_DOMAIN_ID", "76")
-    import fjr_interface.ros  # noqa: F401 keeps discovery on this machine
 
     measured: dict[str, list[float]] = {}
     for _ in range(rounds):

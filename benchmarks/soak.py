@@ -30,11 +30,11 @@ import numpy as np
 from fault_matrix import plan_in, running, with_onset
 from machine import describe
 
-from fjr_bringup.batch_run import simulate_campaign
-from fjr_bringup.campaign import CAMPAIGN_FILE, Campaign
-from fjr_bringup.progress import CampaignProgress
+from fjr_bringup.campaign.batch_run import simulate_campaign
+from fjr_bringup.campaign.plan import CAMPAIGN_FILE, Campaign
+from fjr_bringup.campaign.progress import CampaignProgress
 from fjr_bringup.rehearsal.rehearse import judged
-from fjr_sim_node.faults import CATALOGUE
+from fjr_sim_node.drive.faults import CATALOGUE
 
 MARK = f"FJR_SOAK={uuid.uuid4().hex}"
 MOST_GROWTH_MB = 8.0
@@ -146,7 +146,7 @@ def lockstep(realizations: int) -> bool:
     """Record a campaign that is sabotaged; print what came of it; return whether all is well."""
     memory, chance = Memory(fewest=60), random.Random(SEED)
     folder = Path(tempfile.mkdtemp())
-    command = [sys.executable, "-m", "fjr_bringup", "run", "--out", str(folder / "graph"), *RUN]
+    command = [sys.executable, "-m", "fjr_cli", "run", "--out", str(folder / "graph"), *RUN]
     command += ["--realizations", str(realizations)]
     kills = left = 0
     for _ in range(realizations + _MOST_FAILURES):

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from machine import describe
 
-FJR = [sys.executable, "-m", "fjr_bringup"]
+FJR = [sys.executable, "-m", "fjr_cli"]
 
 
 def seconds(command: list[str], **environment: str) -> float:

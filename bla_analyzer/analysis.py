@@ -1,4 +1,4 @@
-"""From a folder of bags to a `Result`."""
+"""Analysis of a folder of bags: BLA, noise and distortion of each level, as a `Result`."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from pathlib import Path
 
 import numpy as np
 
-from fjr_interface.bag_reader import DEFAULT, BagReader, SignalMap, find_bags
-from fjr_interface.errors import InputError
-from fjr_interface.resampled_reader import ResampledReader, open_bag, resampled
-from fjr_interface.resampling import Resampling
+from fjr_interface.bags.reader import DEFAULT, SignalMap
+from fjr_interface.resampling.accuracy import Resampling
+from fjr_kit.check import Check
+from fjr_kit.errors import InputError
+from fjr_records.experiment_folder import ExperimentBag, ExperimentFolder, Override, open_experiment
+from fjr_records.realization import Realization, read_realization, signal_blocks
 
+from .bla.fast import fast_bla
+from .bla.robust import INPUT_VARIANCE_LIMIT, robust_bla
 from .checks import check_realization, periodicity
-from .fast import fast_bla
-from .levels import line_levels
-from .metrics import ReferenceModel, compare
-from .plan import Override, Plan, PlannedBag, plan
-from .realization import Grid, Realization, read_realization, signal_blocks
-from .result import BlaEstimate, Check, LevelResult, Method, Result
-from .robust import INPUT_VARIANCE_LIMIT, robust_bla
+from .compare.metrics import ReferenceModel, compare
+from .distortion.levels import line_levels
+from .results.result import BlaEstimate, LevelResult, Method, Result
 
 Progress = Callable[[int, int, str], None]
 """Called after each bag with (bags done, bags, name of the bag)."""
@@ -53,6 +53,10 @@ def analyze(
         resampling: how to bring unevenly sampled bags onto an even grid; None refuses them.
         progress: called after each bag.
 
+    Returns:
+        For each level the BLA (paper eq. 11) in rad/(N m) with its variances at the excited lines,
+        the spectra of all lines in rad and N m, and the distance from each model in dB^2.
+
     Raises:
         InputError: bags that are not whole or do not belong together, data that the method cannot
             use, or a response that is periodic at no level.
@@ -60,13 +64,11 @@ def analyze(
     if method not in ("robust", "fast"):
         raise InputError(f"method must be robust or fast, not {method!r}.")
     sources = replace(signal_map, link=None)
-    readers = [open_bag(path, sources, resampling) for path in find_bags(folder)]
-    experiment = plan(readers, override or Override())
-    _refuse_lines_beyond_band(readers, experiment.grid)
+    experiment = open_experiment(folder, sources, override=override, resampling=resampling)
     realizations = _read(experiment, progress)
     levels: list[LevelResult] = []
     checks: list[Check] = []
-    notes = [*experiment.notes, *resampled(readers)]
+    notes = [*experiment.notes]
     if sources.reference is None:
         notes.append("No reference is read: the torque stands for it, as in an open loop.")
     for level, group in groupby(realizations, key=lambda one: one.level):
@@ -93,18 +95,7 @@ def analyze(
     )
 
 
-def _refuse_lines_beyond_band(readers: Sequence[BagReader], grid: Grid) -> None:
-    """Raise InputError if lines lie where a bag's resampled signals are not faithful."""
-    last_hz = grid.lines.last * grid.sample_rate_hz / grid.samples_per_period
-    for reader in readers:
-        if isinstance(reader, ResampledReader) and last_hz > reader.band_hz:
-            raise InputError(
-                f"{reader.path.name}: lines up to {last_hz:g} Hz are excited, but resampling is "
-                f"faithful up to {reader.band_hz:.4g} Hz only; record with a higher rate."
-            )
-
-
-def _read(experiment: Plan, progress: Progress | None) -> list[Realization]:
+def _read(experiment: ExperimentFolder, progress: Progress | None) -> list[Realization]:
     """Read all bags side by side; the result is in the order of the plan."""
     bags = experiment.bags
     firsts = {bag.level: bag.realization for bag in reversed(bags)}
@@ -124,7 +115,7 @@ def _read(experiment: Plan, progress: Progress | None) -> list[Realization]:
     return [task.result() for task in tasks]
 
 
-def _read_bag(bag: PlannedBag, experiment: Plan, keep_signals: bool) -> Realization:
+def _read_bag(bag: ExperimentBag, experiment: ExperimentFolder, keep_signals: bool) -> Realization:
     grid = experiment.grid
     periods = signal_blocks(bag.reader, grid.samples_per_period)
     return read_realization(bag.name, bag.level, bag.realization, periods, grid, keep_signals)
@@ -133,7 +124,7 @@ def _read_bag(bag: PlannedBag, experiment: Plan, keep_signals: bool) -> Realizat
 def _analyze_level(
     level: int,
     group: Sequence[Realization],
-    experiment: Plan,
+    experiment: ExperimentFolder,
     method: Method,
     models: Sequence[ReferenceModel],
 ) -> tuple[LevelResult, list[Check], list[str]]:
@@ -155,7 +146,7 @@ def _level_result(
     level: int,
     group: Sequence[Realization],
     used: Sequence[Realization],
-    experiment: Plan,
+    experiment: ExperimentFolder,
     bla: BlaEstimate | None,
     models: Sequence[ReferenceModel],
 ) -> LevelResult:
@@ -168,7 +159,9 @@ def _level_result(
     assert signals is not None
     return LevelResult(
         level=level,
-        amplitude_rad=next(b.amplitudes_rad for b in experiment.bags if b.level == level),
+        amplitude_rad=next(
+            b.experiment.amplitudes_rad for b in experiment.bags if b.level == level
+        ),
         bla=bla,
         excited=line_levels(spectra, grid.lines, grid.lines.excited, g),
         odd=line_levels(spectra, grid.lines, grid.lines.odd, g),

@@ -1,21 +1,17 @@
-"""Write an analysis to a folder, whole or not at all."""
+"""Writes the files of an analysis into a folder, all of them or none."""
 
 from __future__ import annotations
 
 import platform
-import shutil
-import uuid
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
 
-from fjr_interface.errors import InputError
-from fjr_interface.installed import product_version
+from fjr_kit.atomic import result_folder
+from fjr_kit.installed import product_version
 
-from .result import Result
-from .result_json import load_result, to_json
-from .tables import frf_csv, frf_mat, frf_npz, to_frd
+from .results.result import Result
+from .results.tables import frf_csv, frf_mat, frf_npz
 
 PACKAGES = ("numpy", "scipy", "matplotlib", "plotly")
 OWN_FILES = ("report.html", "frf.csv", "frf.npz", "frf.mat", "result.json", "figures/*.p[nd][gf]")
@@ -26,7 +22,7 @@ Progress = Callable[[str], None]
 
 def write_result(
     result: Result,
-    out: Path,
+    out: Path | str,
     *,
     figures: bool = True,
     report: bool = True,
@@ -56,15 +52,15 @@ def write_result(
         InputError: `out` cannot be written.
     """
     say = progress or (lambda _: None)
-    with atomic_folder(Path(out)) as folder:
+    with result_folder(Path(out), OWN_FILES) as folder:
         _write_data(result, folder, say)
         if figures:
-            from .figures import write_figures
+            from .report.figures import write_figures
 
             (folder / "figures").mkdir()
             write_figures(result, folder / "figures", say)
         if report:
-            from .report import render_report
+            from .report.report_page import render_report
 
             say("report.html")
             text = render_report(result, provenance(command, date))
@@ -75,7 +71,7 @@ def write_result(
 def _write_data(result: Result, folder: Path, say: Progress) -> None:
     """Write the numbers of the result, one file at a time."""
     files: tuple[tuple[str, Callable[[Result], str | bytes]], ...] = (
-        ("result.json", to_json),
+        ("result.json", Result.to_json),
         ("frf.csv", frf_csv),
         ("frf.npz", frf_npz),
         ("frf.mat", frf_mat),
@@ -94,45 +90,3 @@ def provenance(command: str | None, date: str | None) -> dict[str, str]:
     versions += [f"{name} {version(name)}" for name in PACKAGES]
     named = {name: text for name, text in given.items() if text is not None}
     return named | {"versions": ", ".join(versions)}
-
-
-@contextmanager
-def atomic_folder(out: Path, own: Iterable[str] = OWN_FILES) -> Iterator[Path]:
-    """Yield a temporary folder; its files move into `out` when the block succeeds.
-
-    It lies beside `out`, or within it where that exists: `out` may be a file system of its own.
-    What an earlier run has left, as the patterns `own` name it, goes.
-    """
-    if out.exists() and not out.is_dir():
-        raise InputError(f"{out}: is a file; name a folder for the results.")
-    name = f".{uuid.uuid4().hex[:12]}.part"
-    temporary = (out if out.exists() else out.parent) / name
-    try:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        temporary.mkdir()
-        yield temporary
-        _move(temporary, out, own)
-    except OSError as error:
-        raise InputError(
-            f"{out}: cannot be written ({error.strerror or error}); name another folder for the "
-            "results or make room."
-        ) from None
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
-
-
-def _move(folder: Path, out: Path, own: Iterable[str]) -> None:
-    """Move all files of `folder` into `out`, replacing those of an earlier analysis."""
-    if not out.exists():
-        folder.rename(out)
-        return
-    new = [path.relative_to(folder) for path in folder.rglob("*") if path.is_file()]
-    stale = {path.relative_to(out) for pattern in own for path in out.glob(pattern)}
-    for path in stale - set(new):
-        (out / path).unlink()
-    for path in new:
-        (out / path).parent.mkdir(exist_ok=True)
-        (folder / path).replace(out / path)
-
-
-__all__ = ["load_result", "to_frd", "write_result"]

@@ -1,1 +1,22 @@
-"""Controller: the filtered PD law, and the node that runs it."""
+"""Controller: the control law behind its safety functions, and the node that runs it.
+
+Reference and measured position go in, motor torque comes out. Begin with `pd_filtered` (the
+default law, paper eq. 12); `transfer_function` is any other linear law, `controller_file` the form
+in which a user states one. `safety` holds limits and trips, `supervised_law` puts the law behind
+them, `real_time` answers on the wall clock, `node` speaks ROS.
+
+    >>> from controller_node import CONTROLLER, describe
+    >>> describe(CONTROLLER.check({"p": 150.0}))  # as an experiment description holds it
+    {'kind': 'pd_filtered', 'p': 150.0, 'd': 60.0, 'n': 24.0, 'torque_limit_nm': None}
+"""
+
+from typing import TYPE_CHECKING
+
+from fjr_kit.public_names import deferred_names
+
+if TYPE_CHECKING:
+    from .pd_filtered import CONTROLLER, describe
+else:
+    __getattr__, __dir__ = deferred_names(__name__)
+
+__all__ = ["CONTROLLER", "describe"]

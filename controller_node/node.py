@@ -10,30 +10,35 @@ from rclpy.duration import Duration
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
-from fjr_interface import ros, topics
-from fjr_interface.errors import InputError
+from fjr_interface import topics
+from fjr_interface.bags.joint_state import JointStateReader, JointStateWriter, LayoutError
 from fjr_interface.experiment import Experiment
 from fjr_interface.health import ERROR, OK, WARN, Health, Speed
-from fjr_interface.joint_state import JointStateReader, JointStateWriter, LayoutError
 from fjr_interface.parameters import ParameterGroup
 from fjr_interface.real_time import LOCKSTEP, MODE_PARAMETER, NEVER, REAL_TIME, keep_pauses_out
+from fjr_interface.ros import runtime, spinning
+from fjr_interface.ros.program import Program
+from fjr_interface.waiting import Lack
+from fjr_kit.errors import InputError
 
-from . import pd_filtered, safety
-from .guarded import GuardedLaw
+from . import limits, pd_filtered
 from .real_time import Answers, RealTimeController
+from .source import Source
+from .supervised_law import SupervisedLaw
 
 PARAMETERS = ParameterGroup(
     *pd_filtered.CONTROLLER,
-    *safety.SAFETY,
+    *limits.SAFETY,
     MODE_PARAMETER,
-    ros.JOINT_PARAMETER,
-    ros.readers_parameter("simulator"),
+    runtime.JOINT_PARAMETER,
+    runtime.readers_parameter("simulator"),
 )
 
+_LOOK_S = 0.5  # between two looks at who publishes
 _LAST_WORD_S = 0.2  # for a torque to arrive before the node ends
 
 
-class ControllerNode(ros.RigNode):
+class ControllerNode(runtime.RigNode):
     """Controller driven by the signal topics and their stamps only.
 
     A position with the stamp of the first sample starts a new realization: the filter state is
@@ -49,7 +54,7 @@ class ControllerNode(ros.RigNode):
         self._decode_reference = JointStateReader("position").decode
         self._decode_position = JointStateReader("position").decode
         self._real_time = self.values["mode"] == REAL_TIME
-        self._law = GuardedLaw(self.values, real_time=self._real_time)
+        self._law = SupervisedLaw(self.values, real_time=self._real_time)
         self._loop = RealTimeController(self._law, self.values)
         self._references: dict[int, float] = {}
         self._newest_reference = 0
@@ -59,32 +64,41 @@ class ControllerNode(ros.RigNode):
         self._replaced = False
         self._tripped: str | None = None
         self._speed = Speed()
+        self._excitations: frozenset[bytes] = frozenset()
         self._start_run()
-        self._torque = self.create_publisher(JointState, topics.MOTOR_TORQUE.topic, ros.SIGNAL_QOS)
-        self._reference = self.create_subscription(
-            JointState, topics.REFERENCE.topic, self._on_reference, ros.SIGNAL_QOS, raw=True
+        self._torque = self.create_publisher(
+            JointState, topics.MOTOR_TORQUE.topic, runtime.SIGNAL_QOS
         )
-        self.create_subscription(
+        self.claim(self._torque)
+        self._reference = self.create_subscription(
+            JointState, topics.REFERENCE.topic, self._on_reference, runtime.SIGNAL_QOS, raw=True
+        )
+        self._positions = self.create_subscription(
             JointState,
             topics.MOTOR_POSITION.topic,
             self._on_position_in_real_time if self._real_time else self._on_position,
-            ros.SIGNAL_QOS,
+            runtime.SIGNAL_QOS,
             raw=True,
         )
+        self._sources = {
+            topics.REFERENCE.topic: Source(self, self._reference),
+            topics.MOTOR_POSITION.topic: Source(self, self._positions),
+        }
+        self.call_every(_LOOK_S, self._look_for_others)
         self.create_subscription(
-            String, topics.EXPERIMENT_TOPIC, self._on_experiment, ros.EXPERIMENT_QOS
+            String, topics.EXPERIMENT_TOPIC, self._on_experiment, runtime.EXPERIMENT_QOS
         )
         self._description = self.create_publisher(
-            String, topics.CONTROLLER_TOPIC, ros.EXPERIMENT_QOS
+            String, topics.CONTROLLER_TOPIC, runtime.EXPERIMENT_QOS
         )
         self._describe()
         self.create_trigger("~/estop", self._estop)
         self.create_trigger("~/release", self._release)
         self.create_trigger("~/status", lambda: (self._tripped is None, self._state))
 
-    def check(self, values: ros.Values) -> None:
+    def check(self, values: runtime.Values) -> None:
         """Refuse hardware without limits and confirmation."""
-        safety.check_hardware(values)
+        limits.check_hardware(values)
 
     def values_changed(self) -> None:
         """Describe the controller anew."""
@@ -105,11 +119,44 @@ class ControllerNode(ros.RigNode):
         self._first_ns = self._due_ns = topics.stamp_ns(1, self._rate)
 
     def _on_experiment(self, message: String) -> None:
-        self._loop.end(Experiment.from_json(message.data, "topic experiment").samples)
+        if not self._real_time:
+            return  # its end is that of the positions
+        try:
+            experiment = Experiment.from_json(message.data, "topic experiment")
+        except InputError as error:
+            self._trip(f"{error}".rstrip("."))
+            return
+        rate = self.values["sample_rate_hz"]
+        if experiment.sample_rate_hz != rate:
+            self._trip(
+                f"the experiment has sample_rate_hz {experiment.sample_rate_hz:g}, the controller "
+                f"{rate:g}"
+            )
+        self._loop.end(experiment.samples)
+
+    def _look_for_others(self) -> None:
+        """Refuse a second publisher: in real time each message looks for one, too."""
+        for source in self._sources.values():
+            if self._real_time:
+                source.look()
+                self._refuse_second(source)
+            elif others := source.others():
+                raise InputError(others)
+
+    def _refuse_second(self, source: Source) -> None:
+        if (second := source.second()) and self._law.safety.tripped is None:
+            self._trip(second)
 
     def _on_reference(self, message: bytes) -> None:
-        for each in (message, *ros.take_all(self._reference)):  # they come in bursts
-            stamp, value = self._decoded(self._decode_reference, each, "reference")
+        if self._real_time:
+            self._refuse_second(self._sources[topics.REFERENCE.topic])
+        for each in (message, *runtime.take_all(self._reference)):  # they come in bursts
+            try:
+                stamp, value = self._decode_reference(each)
+            except LayoutError as error:
+                self._refuse_unreadable(error, topics.REFERENCE.topic)
+                continue
+            self._check_number(stamp, value, topics.REFERENCE.topic)
             if stamp <= self._newest_reference or not self._newest_reference:
                 self._leave_run()
             self._newest_reference = stamp
@@ -132,8 +179,14 @@ class ControllerNode(ros.RigNode):
         self._replaced, self._ready, self._position = self._sample > 0, False, None
 
     def _on_position(self, message: bytes) -> None:
-        stamp, value = self._decoded(self._decode_position, message, "motor_position")
+        try:
+            stamp, value = self._decode_position(message)
+        except LayoutError as error:
+            self._refuse_unreadable(error, topics.MOTOR_POSITION.topic)
+            return
+        self._check_number(stamp, value, topics.MOTOR_POSITION.topic)
         if stamp == self._first_ns:
+            self._look_for_others()
             self._start_run()
             self._ready = self._replaced = False
         elif stamp != self._due_ns:
@@ -152,11 +205,12 @@ class ControllerNode(ros.RigNode):
         else:
             self._answer()
 
-    def _lacking(self) -> str | None:
-        return self.unread(self._torque) or self.unwritten(self._reference)
+    def _lacking(self) -> Lack | None:
+        return self.unread(self._torque) or self.unwritten(self._reference, "excitation")
 
     def _begin(self) -> None:
         self._ready = True
+        self._excitations = self.writers("excitation")
         self._answer()
 
     def _answer(self) -> None:
@@ -175,12 +229,16 @@ class ControllerNode(ros.RigNode):
 
     def _on_position_in_real_time(self, message: bytes) -> None:
         now_ns = time.monotonic_ns()
+        self._refuse_second(self._sources[topics.MOTOR_POSITION.topic])
         try:
             stamp, value = self._decode_position(message)
         except LayoutError as error:
-            self._say(self._loop.trip(now_ns, f"a position is unreadable: {error}", at_once=True))
+            self._refuse_unreadable(error, topics.MOTOR_POSITION.topic)
             return
         self._say(self._loop.position(now_ns, stamp, value))
+
+    def _trip(self, reason: str, *, at_once: bool = False) -> None:
+        self._say(self._loop.trip(time.monotonic_ns(), reason, at_once=at_once))
 
     def on_time(self, now_ns: int) -> None:
         """Watch the positions in real time."""
@@ -202,19 +260,18 @@ class ControllerNode(ros.RigNode):
             self._say(self._loop.serve(time.monotonic_ns()))
         self._torque.wait_for_all_acked(Duration(seconds=_LAST_WORD_S))
 
-    def _decoded(self, decode, message: bytes, topic: str) -> tuple[int, float]:
-        """Decode a message of a signal topic; raise InputError if it can't become a torque."""
-        try:
-            stamp, value = decode(message)
-        except LayoutError as error:
-            raise InputError(
-                f"Topic {topic}: {error}; publish JointState with one joint."
-            ) from None
+    def _refuse_unreadable(self, error: LayoutError, topic: str) -> None:
+        """Trip at a message that is no JointState of one joint; it ends a lockstep."""
+        if not self._real_time:
+            raise InputError(f"Topic {topic}: {error}; publish JointState with one joint.")
+        at_once = topic == topics.MOTOR_POSITION.topic
+        self._trip(f"a message of {topic} is unreadable: {error}", at_once=at_once)
+
+    def _check_number(self, stamp: int, value: float, topic: str) -> None:
         if not self._real_time and not math.isfinite(value):
             raise InputError(
                 f"Topic {topic}: {value} at {stamp * 1e-9:.6f} s; no torque from that."
             )
-        return stamp, value
 
     def _estop(self) -> tuple[bool, str]:
         self._law.trip("emergency stop")
@@ -245,35 +302,44 @@ class ControllerNode(ros.RigNode):
 
     def health(self) -> Health:
         """Return trip and counters of the run."""
-        guard, loop = self._law.safety, self._loop
+        safety, loop = self._law.safety, self._loop
         bad = loop.missing + loop.lost + loop.stale
         samples = loop.answered if self._real_time else self._sample
         return Health(
-            ERROR if guard.tripped else WARN if bad else OK,
+            ERROR if safety.tripped else WARN if bad else OK,
             self._state,
             {
                 "mode": self.values["mode"],
                 "hardware": str(self.values["hardware"]).lower(),
                 "samples": samples,
                 "speed (x real time)": self._speed.look(samples, self._rate),
-                "saturated samples": self._law.saturated + guard.saturated,
+                "saturated samples": self._law.saturated + safety.saturated,
                 "missing references": loop.missing,
                 "lost positions": loop.lost,
                 "stale positions": loop.stale,
-                "trips": guard.trips,
-                "trip": guard.tripped or "none",
+                "position from": self._sources[topics.MOTOR_POSITION.topic].said,
+                "reference from": self._sources[topics.REFERENCE.topic].said,
+                "trips": safety.trips,
+                "trip": safety.tripped or "none",
             },
         )
 
-    def owed(self) -> str | None:
-        """Return the reference that a position waits for, or the run that it could answer."""
+    def owed(self) -> Lack | None:
+        """Return the reference that a position waits for, or who is not there to be answered."""
         if self._loop.strange:
-            return "a new realization: the one under way began without this controller"
-        if self._position is None:
-            return None
-        return f"the reference of {self._position[0] * 1e-9:.6f} s"
+            return Lack(
+                "a new realization: the one under way began without this controller",
+                "`fjr reset` starts one",
+            )
+        if self._position is not None:
+            reference = f"the reference of {self._position[0] * 1e-9:.6f} s"
+            return self.overdue(reference, "excitation", self._excitations)
+        return self.unwritten(self._positions, "simulator") or self.unwritten(
+            self._reference, "excitation"
+        )
 
 
 def main() -> int:
     """Run the node; the console script `controller_node`."""
-    return ros.run(ControllerNode)
+    program = Program("controller_node", ControllerNode.__doc__, PARAMETERS)
+    return spinning.run(ControllerNode, program=program)

@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from fjr_interface.compiled import inlined
-from fjr_interface.errors import InputError
 from fjr_interface.parameters import Parameter, ParameterGroup
+from fjr_kit.compiled import inlined
+from fjr_kit.errors import InputError
 
 CONTROLLER = ParameterGroup(
     Parameter("sample_rate_hz", 1000.0, "Hz", "Rate of the samples", 100.0, 20_000.0),

@@ -1,120 +1,33 @@
-"""What keeps a rig safe from its controller: limits, soft start, trips that stay until released.
+"""Safety functions of the controller: limits, soft start, and trips that stay until released.
 
 A limit of torque or torque rate bounds the torque; a position or a velocity beyond its limit, a
 jump, a value that is no number, a watchdog or the emergency stop trips. A trip takes the torque to
 zero, where it stays until it is released: by a ramp of stated length, or at once where the position
 can't be trusted. After a release the torque rises softly.
+
+Every limit holds in sample time and in the time of the clock: what may change counts the shorter of
+the two, what must be reached the longer. A comparison with what is no number trips.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
-
-from fjr_interface.errors import InputError
-from fjr_interface.parameters import Parameter, ParameterGroup
-
-SAFETY = ParameterGroup(
-    Parameter(
-        "torque_rate_limit_nm_s",
-        math.inf,
-        "N m/s",
-        "The torque changes no faster than this; .inf: no limit",
-        1e-3,
-    ),
-    Parameter(
-        "position_limit_rad",
-        math.inf,
-        "rad",
-        "Trips when the measured position is beyond +- this; .inf: no limit",
-        1e-6,
-    ),
-    Parameter(
-        "velocity_limit_rad_s",
-        math.inf,
-        "rad/s",
-        "Trips when the velocity is beyond +- this; .inf: no limit",
-        1e-6,
-    ),
-    Parameter(
-        "velocity_window_s",
-        0.005,
-        "s",
-        "Time constant of the velocity estimate; a jump of velocity_limit_rad_s times this trips",
-        1e-5,
-        10.0,
-    ),
-    Parameter(
-        "position_jump_rad",
-        0.1,
-        "rad",
-        "Real time only: trips when the position changes by more from sample to sample; .inf: no "
-        "limit",
-        1e-6,
-    ),
-    Parameter(
-        "position_timeout_s",
-        0.1,
-        "s",
-        "Real time only: trips when no position came for this long; .inf: never",
-        1e-3,
-    ),
-    Parameter(
-        "reference_timeout_s",
-        0.1,
-        "s",
-        "Real time only: trips when positions had no reference for this long; .inf: never",
-        0.0,
-    ),
-    Parameter(
-        "torque_soft_start_s",
-        0.5,
-        "s",
-        "Rise of the torque from zero after a release and, in real time, when a run begins",
-        0.0,
-        60.0,
-    ),
-    Parameter(
-        "ramp_down_s",
-        0.05,
-        "s",
-        "Ramp of the torque to zero after a trip by a watchdog or the emergency stop",
-        0.0,
-        10.0,
-    ),
-    Parameter("hardware", False, "", "The drive is real: all limits and confirm must be given"),
-    Parameter("confirm", "", "", "With hardware: the name of the joint that is going to move"),
-)
-"""Parameters of the safety functions; the same names are parameters of the controller node."""
+from typing import Any, NamedTuple
 
 _ROUNDING = 1e-9  # so that the ramp ends when its steps say so
-_HARDWARE_LIMITS = (
-    "torque_limit_nm",
-    "torque_rate_limit_nm_s",
-    "position_limit_rad",
-    "velocity_limit_rad_s",
-)
 
 
-def check_hardware(values: Mapping[str, Any]) -> None:
-    """Refuse hardware without limits and confirmation.
+class Elapsed(NamedTuple):
+    """Time since the last torque, by the stamps and by the clock.
 
-    Args:
-        values: checked values of SAFETY, of the control law, and `joint`.
-
-    Raises:
-        InputError: `hardware` is true and a limit is infinite, or `confirm` is not the joint.
+    Attributes:
+        least_s: the shorter of both.
+        most_s: the longer of both.
     """
-    if not values["hardware"]:
-        return
-    endless = [name for name in _HARDWARE_LIMITS if math.isinf(values[name])]
-    if endless:
-        raise InputError(f"hardware needs finite limits; give {', '.join(endless)}.")
-    if values["confirm"] != values["joint"]:
-        raise InputError(
-            f"hardware moves joint {values['joint']!r}; give its name as confirm to confirm that."
-        )
+
+    least_s: float
+    most_s: float
 
 
 class Safety:
@@ -132,25 +45,39 @@ class Safety:
         self.tripped: str | None = None
         self.trips = 0
         self._real_time = real_time
+        self._torque = self._ramp_from = self._ramp = 0.0
+        self._forget_motion()
         self.begin_run(values)
 
     def begin_run(self, values: Mapping[str, Any]) -> None:
-        """Begin a run from rest, with limits read anew; a trip stays."""
+        """Begin a run, with limits read anew; a trip stays.
+
+        A lockstep begins at rest. In real time the joint is where it was, with the torque that it
+        had.
+        """
         self._rate = values["torque_rate_limit_nm_s"]
         self._position_limit = values["position_limit_rad"]
         self._velocity_limit = values["velocity_limit_rad_s"]
         self._window_s = values["velocity_window_s"]
         self._jump = values["position_jump_rad"] if self._real_time else math.inf
+        self._reference_limit = values["reference_limit_rad"]
+        self._reference_step = values["reference_step_rad"]
+        self._period_s = 1.0 / values["sample_rate_hz"]
         self._soft_start_s = values["torque_soft_start_s"]
         self._ramp_s = values["ramp_down_s"]
-        self._position: float | None = None
-        self._velocity = 0.0
-        self._torque = self._ramp_from = 0.0
         self._rise = 0.0 if self._real_time else 1.0
-        self._ramp = 0.0
         self._falling = False
         self.resuming = False
         self.saturated = 0
+        limit = values["torque_limit_nm"]
+        self._torque = min(max(self._torque, -limit), limit)
+        if not self._real_time:
+            self._torque = self._ramp_from = self._ramp = 0.0
+            self._forget_motion()
+
+    def _forget_motion(self) -> None:
+        self._position: float | None = None
+        self._velocity = 0.0
 
     @property
     def needed(self) -> bool:
@@ -169,7 +96,7 @@ class Safety:
         return self._falling or self.tripped is not None
 
     def take_over(self, torque: float) -> None:
-        """Begin to guard a controller whose latest torque was this (N m)."""
+        """Take over from a controller whose latest torque was this (N m)."""
         self._torque = torque
 
     def trip(self, reason: str, *, at_once: bool = False) -> None:
@@ -196,63 +123,97 @@ class Safety:
         was, self.tripped = self.tripped, None
         if was is not None:
             self._rise, self.resuming = 0.0, True
+            self._forget_motion()
         return was is not None
 
-    def observe(self, position: float, duration_s: float, samples: int = 1) -> None:
+    def observe(self, position: float, elapsed: Elapsed) -> None:
         """Look at a measured position; trip if it is beyond a limit.
 
         Args:
             position: y (rad).
-            duration_s: time since the last one.
-            samples: sample periods since the last one.
+            elapsed: time since the last one; at least one sample period is counted, since positions
+                that come late come together.
         """
         if not math.isfinite(position):
             self.trip(f"the position is {position}", at_once=True)
             return
         before = position if self._position is None else self._position
         self._position = position
+        duration_s = max(elapsed.least_s, self._period_s)
         change = position - before
         share = -math.expm1(-duration_s / self._window_s)
-        self._velocity += share * (change / duration_s - self._velocity)
-        if abs(change) > self._jump * samples:
+        velocity = self._velocity + share * (change / duration_s - self._velocity)
+        self._velocity = velocity
+        if not abs(change) <= self._jump * (duration_s / self._period_s):
             self.trip(
                 f"the position jumped by {change:.4g} rad, beyond position_jump_rad {self._jump:g}",
                 at_once=True,
             )
-        if abs(position) > self._position_limit:
+        if not abs(position) <= self._position_limit:
             self.trip(
                 f"position {position:.4g} rad beyond position_limit_rad {self._position_limit:g}",
                 at_once=True,
             )
-        if abs(self._velocity) > self._velocity_limit:
+        if not abs(velocity) <= self._velocity_limit or not math.isfinite(velocity):
             self.trip(
-                f"velocity {self._velocity:.4g} rad/s beyond velocity_limit_rad_s "
+                f"velocity {velocity:.4g} rad/s beyond velocity_limit_rad_s "
                 f"{self._velocity_limit:g}",
                 at_once=True,
             )
+        if not math.isfinite(velocity):
+            self._forget_motion()
 
-    def bound(self, torque: float, duration_s: float) -> float:
+    def accepts(self, reference: float, before: float, duration_s: float) -> bool:
+        """Look at a reference; trip and return False if it is beyond a limit.
+
+        Args:
+            reference: r (rad).
+            before: the last one that was accepted, or the position if there is none (rad).
+            duration_s: time between the two.
+        """
+        if not math.isfinite(reference):
+            self.trip(f"the reference is {reference}", at_once=True)
+            return False
+        if not abs(reference) <= self._reference_limit:
+            self.trip(
+                f"reference {reference:.4g} rad beyond reference_limit_rad "
+                f"{self._reference_limit:g}"
+            )
+            return False
+        samples = max(duration_s / self._period_s, 1.0)
+        if not abs(reference - before) <= self._reference_step * samples:
+            self.trip(
+                f"the reference changed by {reference - before:.4g} rad, beyond reference_step_rad "
+                f"{self._reference_step:g}"
+            )
+            return False
+        return True
+
+    def bound(self, torque: float, elapsed: Elapsed) -> float:
         """Return the torque (N m) that may be commanded instead of the wanted one.
 
         Args:
             torque: what the control law wants (N m).
-            duration_s: time since the last torque.
+            elapsed: time since the last torque.
         """
         if not math.isfinite(torque):
             self.trip(f"the torque is {torque}", at_once=True)
         if self.held:
-            fall = duration_s / self._ramp_s if self._ramp_s > 0.0 else 1.0
+            # The ramp begins with the trip, however long ago the last torque was.
+            passed_s = elapsed.least_s if self._ramp == 1.0 else elapsed.most_s
+            fall = passed_s / self._ramp_s if self._ramp_s > 0.0 else 1.0
             self._ramp = self._ramp - fall if self._ramp - fall > _ROUNDING else 0.0
             self._torque = self._ramp_from * self._ramp if self._ramp else 0.0
             return self._torque
         self.resuming = False
         if self._rise < 1.0:
-            rise = duration_s / self._soft_start_s if self._soft_start_s > 0.0 else 1.0
+            rise = elapsed.least_s / self._soft_start_s if self._soft_start_s > 0.0 else 1.0
             self._rise = min(self._rise + rise, 1.0)
             torque *= self._rise
-        step = self._rate * duration_s
-        if abs(torque - self._torque) > step:
-            self.saturated += 1
-            torque = self._torque + math.copysign(step, torque - self._torque)
+        if math.isfinite(self._rate):
+            step = self._rate * elapsed.least_s
+            if abs(torque - self._torque) > step:
+                self.saturated += 1
+                torque = self._torque + math.copysign(step, torque - self._torque)
         self._torque = torque
         return torque

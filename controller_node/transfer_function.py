@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from fjr_interface.compiled import inlined
-from fjr_interface.errors import InputError
+from fjr_kit.compiled import inlined
+from fjr_kit.errors import InputError
 
 from . import pd_filtered
 
@@ -129,8 +129,19 @@ def law_of(controller: Mapping[str, Any] | None, sample_rate_hz: float) -> Law:
         InputError: there is no such entry, it is of no known kind, or its values are bad.
     """
     controller = controller or {}
-    if controller.get("kind") == KIND:
+    kind = controller.get("kind")
+    if controller.get("unknown"):
+        raise InputError(
+            f"experiment description: controller: {controller['unknown'][0]} is unknown, so the "
+            "law cannot be simulated; give its value."
+        )
+    if kind == KIND:
         return from_description(controller)
+    if kind == "two_degrees_of_freedom":
+        raise InputError(
+            "experiment description: controller: a law of two degrees of freedom is described but "
+            "not simulated yet; give one from r - y to u."
+        )
     return pd_filtered.coefficients(pd_filtered.from_description(controller, sample_rate_hz))
 
 

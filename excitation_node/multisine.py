@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from fjr_interface.errors import InputError
 from fjr_interface.experiment import Experiment
 from fjr_interface.parameters import Parameter, ParameterGroup
+from fjr_kit.errors import InputError
 
 EXCITATION = ParameterGroup(
     Parameter("sample_rate_hz", 1000.0, "Hz", "Rate of the samples", 100.0, 20_000.0),
@@ -206,7 +206,8 @@ def describe(
             f"soft_start_s {parameters['soft_start_s']:g} s must end within the discarded periods, "
             f"which last {discarded_s:g} s; shorten it or raise transient_periods."
         )
-    return Experiment(
+    return Experiment.of(
+        "excitation",
         sample_rate_hz=rate,
         samples_per_period=samples,
         periods=parameters["periods"],

@@ -13,13 +13,16 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from fjr_interface import ros, topics
-from fjr_interface.errors import InputError
+from fjr_interface import topics
+from fjr_interface.bags.joint_state import JointStateWriter
 from fjr_interface.experiment import Experiment, controller_from_json
 from fjr_interface.health import Health
-from fjr_interface.joint_state import JointStateWriter
 from fjr_interface.parameters import Parameter, ParameterGroup
 from fjr_interface.real_time import NEVER
+from fjr_interface.ros import runtime, spinning
+from fjr_interface.ros.program import Program
+from fjr_interface.waiting import Lack, start
+from fjr_kit.errors import InputError
 
 from . import multisine
 
@@ -40,8 +43,8 @@ STREAM = ParameterGroup(
         "",
         "Wait for the controller's description of itself; false for a controller that gives none",
     ),
-    ros.JOINT_PARAMETER,
-    ros.readers_parameter("controller"),
+    runtime.JOINT_PARAMETER,
+    runtime.readers_parameter("controller"),
 )
 """How a reference is streamed, whatever it is."""
 
@@ -53,9 +56,9 @@ PARAMETERS = ParameterGroup(
 )
 
 _PACES = {
-    "clock": (Clock, "/clock", ros.CLOCK_QOS),
-    "recorded": (Time, topics.RECORDED_TOPIC, ros.EXPERIMENT_QOS),
-    "position": (JointState, topics.MOTOR_POSITION.topic, ros.SIGNAL_QOS),
+    "clock": (Clock, "/clock", runtime.CLOCK_QOS, "simulator"),
+    "recorded": (Time, topics.RECORDED_TOPIC, runtime.EXPERIMENT_QOS, "recorder"),
+    "position": (JointState, topics.MOTOR_POSITION.topic, runtime.SIGNAL_QOS, "simulator"),
 }
 _TIME = struct.Struct("<4xiI")  # with this begins the CDR of all three
 
@@ -64,7 +67,7 @@ _BURST = 100
 _PAUSE_NS = 2_000_000
 
 
-class ExcitationNode(ros.RigNode):
+class ExcitationNode(runtime.RigNode):
     """Plays one realization at a time; `start` (std_srvs/Trigger) plays the one set by parameters.
 
     It streams r, at most `window` samples ahead of the pace, and describes the experiment, which
@@ -75,9 +78,12 @@ class ExcitationNode(ros.RigNode):
         """Create publishers, the pace subscription and the start service."""
         super().__init__("excitation", group)
         self._encode = JointStateWriter("position", self.values["joint"]).encode_many
-        self._reference = self.create_publisher(JointState, topics.REFERENCE.topic, ros.SIGNAL_QOS)
+        self._reference = self.create_publisher(
+            JointState, topics.REFERENCE.topic, runtime.SIGNAL_QOS
+        )
+        self.claim(self._reference)
         self._description = self.create_publisher(
-            String, topics.EXPERIMENT_TOPIC, ros.EXPERIMENT_QOS
+            String, topics.EXPERIMENT_TOPIC, runtime.EXPERIMENT_QOS
         )
         self._stamps = np.empty(0, np.int64)
         self._sent = 0
@@ -87,10 +93,10 @@ class ExcitationNode(ros.RigNode):
         self._stream_taken: int | None = None
         self._untaken = False
         self._played: Experiment | None = None
-        message_type, topic, qos = _PACES[self.values["pace"]]
-        self.create_subscription(message_type, topic, self._on_pace, qos, raw=True)
+        message_type, topic, qos, self._pace_maker = _PACES[self.values["pace"]]
+        self._pace = self.create_subscription(message_type, topic, self._on_pace, qos, raw=True)
         self.create_subscription(
-            String, topics.CONTROLLER_TOPIC, self._on_controller, ros.EXPERIMENT_QOS
+            String, topics.CONTROLLER_TOPIC, self._on_controller, runtime.EXPERIMENT_QOS
         )
         self.create_service(Trigger, "~/start", self._on_start)
         if self.values["autostart"]:
@@ -140,17 +146,22 @@ class ExcitationNode(ros.RigNode):
         self.wait_until(self._lacking, self._begin)
         return experiment
 
-    def _lacking(self) -> str | None:
+    def _lacking(self) -> Lack | None:
         if missing := self.unread(self._reference) or self._untaken_by():
             return missing
         if self._description.get_subscription_count() < 1:
-            return f"a subscriber of {self._description.topic_name}"
+            return Lack(f"a subscriber of {self._description.topic_name}", start("simulator"))
         if self._controller is None and self.values["describe_controller"]:
-            return "the controller's description on topic controller"
+            return Lack(
+                "the controller's description on topic controller",
+                "set describe_controller:=false for a controller that gives none",
+            )
         return None
 
-    def _untaken_by(self) -> str | None:
-        return "the controller to take the reference" if self._untaken else None
+    def _untaken_by(self) -> Lack | None:
+        if not self._untaken:
+            return None
+        return Lack("the controller to take the reference", f"{start('controller')} anew")
 
     def _begin(self) -> None:
         experiment = self._describe()
@@ -166,8 +177,19 @@ class ExcitationNode(ros.RigNode):
         description = String(data=experiment.to_json())
         self.wait_until(self._unready, lambda: self._description.publish(description))
 
-    def _unready(self) -> str | None:
-        return self._untaken_by() or (None if self.due_ns == NEVER else "the first window")
+    def _unready(self) -> Lack | None:
+        return self._untaken_by() or (None if self.due_ns == NEVER else Lack("the first window"))
+
+    @property
+    def _over(self) -> bool:
+        """Whether the pace has reached the end of the reference."""
+        return self._stamps.size > 0 and self._passed_ns >= self._stamps[-1]
+
+    def owed(self) -> Lack | None:
+        """Return that nobody keeps the pace of what is being played."""
+        if not self._stamps.size or self._over:
+            return None
+        return self.unwritten(self._pace, self._pace_maker)
 
     def health(self) -> Health:
         """Return how much of the reference is streamed."""
@@ -177,7 +199,7 @@ class ExcitationNode(ros.RigNode):
         if not self._stamps.size:
             return Health(summary=f"waiting to play {what}")
         return Health(
-            summary=f"playing {what}",
+            summary=f"{'finished' if self._over else 'playing'} {what}",
             values={"samples streamed": self._sent, "samples": int(self._stamps.size)},
         )
 
@@ -198,4 +220,5 @@ class ExcitationNode(ros.RigNode):
 
 def main() -> int:
     """Run the node; the console script `excitation_node`."""
-    return ros.run(ExcitationNode)
+    program = Program("excitation_node", ExcitationNode.__doc__, PARAMETERS)
+    return spinning.run(ExcitationNode, program=program)

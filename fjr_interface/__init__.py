@@ -1,5 +1,25 @@
 """The contract of the rig: topics, clock, experiment description, parameters and bags.
 
-Everything that two rooms of the product must agree on is said here once, and nothing else is.
-Only `fjr_interface.ros` imports rclpy; all other modules work with no ROS present.
+Programs that keep it can take the place of any node, recorder or reader of this product. Begin
+with `topics` (names, types, stamps) and `experiment` (the JSON description of what was played);
+`parameters` and `parameter_file` say what can be set and how ROS parameter files are read. In
+come ROS messages (`ros`, the only part that imports rclpy) and bags (`bags`, read in audited
+blocks); out go the same, and arrays on an even grid (`resampling` for uneven stamps).
+
+    >>> from fjr_interface import SignalMap
+    >>> SignalMap.parse(["position=/joint_states:position[elbow]"]).position.joint
+    'elbow'
 """
+
+from typing import TYPE_CHECKING
+
+from fjr_kit.public_names import deferred_names
+
+if TYPE_CHECKING:
+    from .bags.signals import SignalMap
+    from .experiment import Experiment
+    from .resampling.accuracy import Resampling
+else:
+    __getattr__, __dir__ = deferred_names(__name__)
+
+__all__ = ["Experiment", "Resampling", "SignalMap"]

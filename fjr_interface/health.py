@@ -1,4 +1,4 @@
-"""How a node is, in the terms of diagnostic_msgs, without ROS."""
+"""State of a node in the terms of diagnostic_msgs, without ROS."""
 
 from __future__ import annotations
 

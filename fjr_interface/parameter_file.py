@@ -5,42 +5,51 @@
         k1: 0.0
 
 One file serves the nodes (`--params-file`) and `fjr run` / `fjr simulate`. So that both see the
-same values, scalars are typed by rcl's rules rather than YAML's (`1e-3` is a double, `010` is 8,
-`n` is false) and what rcl would refuse is refused here. Names may be nested and hold the wildcards
-`*` and `**`; where several entries name a node, the later one holds.
+same values, libyaml reads the YAML, as it does for rcl, scalars are typed by rcl's rules rather
+than YAML's (`1e-3` is a double, `010` is 8, `n` is false) and what rcl would refuse is refused
+here. Names may be nested and hold the wildcards `*` and `**`; where several entries name a node,
+the later one holds.
 """
 
 from __future__ import annotations
 
-import math
-import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
-from ruamel.yaml.events import AliasEvent
-from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
+import yaml
+from yaml import MappingNode, Node, ScalarNode, SequenceNode
 
-from .errors import InputError
-from .parameters import ParameterGroup
+from fjr_kit.atomic import write_whole
+from fjr_kit.errors import InputError, shown
+
+from .bounded_yaml import Loader, YamlProblem, bounded_events, yaml_problems
+from .parameters import ParameterGroup, nearest
+from .rcl_values import read_scalar, write_value
 from .topics import NAMESPACE
 
 NODES = ("excitation", "controller", "simulator")
 """Base names of the rig's nodes."""
 
+MOST_CHARACTERS = 2**20
+"""Longest parameter file, and longest value of an option."""
+
+NODES_OWN = frozenset(["joint", "readers", "use_sim_time", "start_type_description_service"])
+"""Parameters that each node has beside its group."""
+
+_DEEPEST = 20
+"""Most levels of a parameter file; libyaml takes long over thousands of brackets."""
+_MOST_DIRECTIVES = 10
+_MOST_VALUES = 100_000
 _PARAMETERS = "ros__parameters"
-_TRUE = frozenset(["Y", "y", "yes", "Yes", "YES", "true", "True", "TRUE", "on", "On", "ON"])
-_FALSE = frozenset(["N", "n", "no", "No", "NO", "false", "False", "FALSE", "off", "Off", "OFF"])
-_INTEGER = re.compile(r"[+-]?(0[xX][0-9a-fA-F]+|0[0-7]*|[1-9][0-9]*)")
-_FLOAT = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
-_NOT_FINITE = re.compile(r"[+-]?\.?(inf|infinity|nan)", re.IGNORECASE)
 
 
 def load_parameter_file(
-    path: str | Path, namespace: str = NAMESPACE, nodes: Sequence[str] = NODES
+    path: str | Path,
+    namespace: str = NAMESPACE,
+    nodes: Sequence[str] = NODES,
+    groups: Mapping[str, ParameterGroup] | None = None,
 ) -> dict[str, dict[str, Any]]:
     """Read a parameter file.
 
@@ -48,27 +57,60 @@ def load_parameter_file(
         path: the YAML file.
         namespace: where the rig's nodes are.
         nodes: base names of the nodes that it may name.
+        groups: descriptions by node base name. What a wildcard gives then goes to the nodes that
+            have such a parameter, and `NODES_OWN` are left out, so that a file that serves the
+            nodes serves whoever needs only these descriptions.
 
     Returns:
         {node base name: {parameter: value}} of the nodes that the file names; a list is a tuple.
         The values are not yet checked against descriptions: see `ParameterGroup.check`.
 
     Raises:
-        InputError: no such file, no YAML, another shape, an unknown node, a value that rcl refuses.
+        InputError: no such file, no YAML, another shape, an unknown node or none at all, a value
+            that rcl refuses, a wildcard's parameter that no node has.
     """
-    root = _compose(path)
+    root = _compose(_read(path), str(path))
     found: dict[str, dict[str, Any]] = {}
-    if root is None:
-        return found
-    for name, parameters in _nodes(path, root, ""):
+    for name, parameters in _nodes(path, root, "") if root is not None else ():
         matching = [node for node in nodes if _matches(name, f"{namespace}/{node}")]
         if not matching:
             known = ", ".join(f"{namespace}/{node}" for node in nodes)
-            raise InputError(f"{path}: there is no node {name}; the nodes are {known}.")
+            raise InputError(f"{path}: there is no node {name[:200]}; the nodes are {known}.")
         values = dict(_values(path, name, parameters, ""))
         for node in matching:
             found.setdefault(node, {}).update(values)
+        if groups is not None:
+            _leave_out(f"{path}: {name}", values, {node: groups[node] for node in matching}, found)
+    if not found:
+        raise InputError(
+            f"{path}: names no node; write values below {namespace}/{nodes[-1]}: {_PARAMETERS}, or "
+            "leave the file out."
+        )
     return found
+
+
+def _leave_out(
+    where: str,
+    values: Mapping[str, Any],
+    groups: Mapping[str, ParameterGroup],
+    found: Mapping[str, dict[str, Any]],
+) -> None:
+    """Take from what was found of these nodes the values of one entry that are not theirs.
+
+    A parameter that none of them has stays if one node is named, whose group then refuses it.
+    """
+    for parameter in values:
+        having = [node for node, group in groups.items() if parameter in group]
+        own = parameter in NODES_OWN
+        if not having and not own and len(groups) > 1:
+            names = [name for group in groups.values() for name in group.names]
+            raise InputError(
+                f"{where}: none of the nodes {', '.join(groups)} has a parameter "
+                f"{shown(parameter)}; did you mean {nearest(parameter, names)}?"
+            )
+        for node in groups:
+            if own or (having and node not in having):
+                found[node].pop(parameter, None)
 
 
 def save_parameter_file(
@@ -96,15 +138,8 @@ def save_parameter_file(
             if isinstance(value, (list, tuple)) and not value:
                 raise InputError(f"{path}: {name} of {node} is empty: give it at least one value.")
             comment = f"  # {group[name].help}" if group and name in group else ""
-            lines.append(f"    {name}: {_to_yaml(value)}{comment}")
-    path = Path(path)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
-        temporary.replace(path)
-    except OSError as error:
-        temporary.unlink(missing_ok=True)
-        raise InputError(f"{path}: cannot be written: {error.strerror}.") from None
+            lines.append(f"    {name}: {write_value(value)}{comment}")
+    write_whole(Path(path), "\n".join(lines) + "\n")
 
 
 def parse_value(text: str, where: str) -> Any:
@@ -114,40 +149,49 @@ def parse_value(text: str, where: str) -> Any:
         InputError: rcl would refuse it; the sentence starts with `where`.
     """
     try:
-        node = YAML(typ="safe", pure=True).compose(text)
-    except YAMLError:
+        node = _compose(text, where)
+    except InputError:
         node = None
     if isinstance(node, ScalarNode):
-        return _scalar(node, where)
+        return read_scalar(node, where)
     if isinstance(node, SequenceNode):
         return _list(node, where)
-    raise InputError(f"{where}: {text!r} is not a value.")
+    raise InputError(f"{where}: {shown(text)} is not a value.")
 
 
-def _compose(path: str | Path) -> Node | None:
-    """Return the tree of the file; None if it is empty."""
+def _read(path: str | Path) -> str:
+    """Return the text of the file."""
     try:
-        text = Path(path).read_text(encoding="utf-8")
+        with Path(path).open("rb") as file:
+            text = file.read(MOST_CHARACTERS + 1)
+        if len(text) > MOST_CHARACTERS:
+            raise InputError(
+                f"{path}: is longer than {MOST_CHARACTERS} bytes; name a parameter file."
+            )
+        return text.decode("utf-8")
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}.") from None
     except UnicodeDecodeError:
         raise InputError(f"{path}: is not a text file in UTF-8.") from None
-    yaml = YAML(typ="safe", pure=True)
+
+
+def _compose(text: str, where: str) -> Node | None:
+    """Return the tree of a YAML text; None if it is empty.
+
+    Raises:
+        InputError: no YAML, or such as no parameter file is; the sentence starts with `where`.
+    """
+    directives = sum(line.startswith("%") for line in text.splitlines())
+    if len(text) > MOST_CHARACTERS or directives > _MOST_DIRECTIVES:
+        raise InputError(f"{where}: is longer, or has more YAML directives, than can be read.")
     try:
-        for event in yaml.parse(text):
-            if isinstance(event, AliasEvent):
-                raise InputError(
-                    f"{path}: line {event.start_mark.line + 1}: ROS does not read YAML "
-                    "aliases (*): write the value out."
-                )
-        return yaml.compose(text)
-    except YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        where = f"line {mark.line + 1}: " if mark else ""
-        what = getattr(error, "problem", None) or str(error).splitlines()[0]
-        raise InputError(f"{path}: {where}this is not YAML ({what}).") from None
-    except RecursionError:
-        raise InputError(f"{path}: is nested too deeply for a parameter file.") from None
+        for _ in bounded_events(text, deepest=_DEEPEST, most_scalars=_MOST_VALUES):
+            pass
+        with yaml_problems(text):
+            return yaml.compose(text, Loader=Loader)
+    except YamlProblem as problem:
+        line = f"line {problem.line}: " if problem.line else ""
+        raise InputError(f"{where}: {line}{problem}.") from None
 
 
 def _entries(path: str | Path, node: Node, what: str) -> Iterator[tuple[str, Node]]:
@@ -161,7 +205,7 @@ def _entries(path: str | Path, node: Node, what: str) -> Iterator[tuple[str, Nod
             raise InputError(f"{where}: {what} holds something that is not a name.")
         if key.value in seen:
             line = key.start_mark.line + 1
-            raise InputError(f"{path}: line {line}: {key.value} stands twice in {what}.")
+            raise InputError(f"{path}: line {line}: {key.value[:200]} stands twice in {what}.")
         seen.add(key.value)
         yield key.value, value
 
@@ -186,7 +230,7 @@ def _nodes(path: str | Path, node: Node, name: str) -> Iterator[tuple[str, Node]
 def _matches(pattern: str, name: str) -> bool:
     """Tell whether a name in the file, wildcards included, means the node of this full name."""
     expression = re.escape(pattern).replace(r"/\*\*", r"(/\w+)*").replace(r"/\*", r"/\w+")
-    return re.fullmatch(expression, name) is not None
+    return re.fullmatch(expression, name, re.ASCII) is not None
 
 
 def _values(path: str | Path, node_name: str, node: Node, prefix: str) -> Iterator[tuple[str, Any]]:
@@ -197,7 +241,7 @@ def _values(path: str | Path, node_name: str, node: Node, prefix: str) -> Iterat
         if isinstance(value, MappingNode):
             yield from _values(path, node_name, value, f"{name}.")
         elif isinstance(value, ScalarNode):
-            yield name, _scalar(value, where)
+            yield name, read_scalar(value, where)
         else:
             yield name, _list(value, where)
 
@@ -205,7 +249,7 @@ def _values(path: str | Path, node_name: str, node: Node, prefix: str) -> Iterat
 def _list(node: Node, where: str) -> tuple[Any, ...]:
     if not all(isinstance(item, ScalarNode) for item in node.value):
         raise InputError(f"{where} must be a plain list of values.")
-    values = tuple(_scalar(item, where) for item in node.value)
+    values = tuple(read_scalar(item, where) for item in node.value)
     if not values:
         raise InputError(f"{where} is an empty list: give it at least one value.")
     if len({type(value) for value in values}) > 1:
@@ -213,52 +257,3 @@ def _list(node: Node, where: str) -> tuple[Any, ...]:
             f"{where} mixes types, which ROS refuses: write every number with a decimal point."
         )
     return values
-
-
-def _scalar(node: ScalarNode, where: str) -> bool | int | float | str:
-    """Return the value in the type that rcl's parser gives it."""
-    text = node.value
-    if node.style in ("'", '"', "|", ">"):
-        return text
-    if not text:
-        raise InputError(f"{where} has no value.")
-    if text in _TRUE or text in _FALSE:
-        return text in _TRUE
-    if _INTEGER.fullmatch(text):
-        return _integer(text)
-    if _NOT_FINITE.fullmatch(text):
-        return float(text.replace(".", ""))
-    if _FLOAT.fullmatch(text) and math.isfinite(float(text)):
-        return float(text)
-    return text
-
-
-def _integer(text: str) -> int | float:
-    """Return a C integer constant, a double where it exceeds 64 bits, as strtoll and strtod do."""
-    digits = text.lstrip("+-")
-    base = 16 if digits[:2] in ("0x", "0X") else 8 if digits[0] == "0" else 10
-    number = int(text, base)
-    return number if -(2**63) <= number < 2**63 else float(number)
-
-
-def _to_yaml(value: Any) -> str:
-    """Return a value such that rcl reads back the same type and, of a double, the same bits."""
-    if isinstance(value, (list, tuple)):
-        return f"[{', '.join(_to_yaml(item) for item in value)}]"
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, int):
-        return str(value)
-    if isinstance(value, float):
-        return _float_to_yaml(value)
-    escaped = (c if c.isprintable() and c not in '"\\' else f"\\U{ord(c):08x}" for c in str(value))
-    return f'"{"".join(escaped)}"'
-
-
-def _float_to_yaml(value: float) -> str:
-    if math.isnan(value):
-        return ".nan"
-    if math.isinf(value):
-        return ".inf" if value > 0 else "-.inf"
-    mantissa, exponent, power = repr(float(value)).partition("e")
-    return (mantissa if "." in mantissa else f"{mantissa}.0") + exponent + power

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from .errors import InputError
+from fjr_kit.errors import InputError, shown
 
 Value = Any
 """A float, int, bool, str or tuple of floats: which one, the default in the description decides."""
@@ -47,34 +47,38 @@ class Parameter:
         """Return the value in the parameter's type; raise InputError with one sentence."""
         if isinstance(self.default, bool):
             if not isinstance(value, bool):
-                raise InputError(f"{self.name} must be true or false, not {value!r}.")
+                raise InputError(f"{self.name} must be true or false, not {shown(value)}.")
             return value
         if isinstance(self.default, str):
             if not isinstance(value, str):
-                raise InputError(f"{self.name} must be a text, not {value!r}.")
+                raise InputError(f"{self.name} must be a text, not {shown(value)}.")
             if self.choices and value not in self.choices:
                 raise InputError(
-                    f"{self.name} must be one of {', '.join(self.choices)}, not {value!r}."
+                    f"{self.name} must be one of {', '.join(self.choices)}, not {shown(value)}."
                 )
             return value
         if isinstance(self.default, tuple):
             values = [value] if isinstance(value, (int, float)) else value
             try:
+                if isinstance(values, str):
+                    raise TypeError
                 return tuple(float(self._number(item)) for item in values)
             except TypeError:
-                raise InputError(f"{self.name} must be a list of numbers, not {value!r}.") from None
+                raise InputError(
+                    f"{self.name} must be a list of numbers, not {shown(value)}."
+                ) from None
         number = self._number(value)
         if isinstance(self.default, int):
-            if number != int(number):
-                raise InputError(f"{self.name} must be a whole number, not {value!r}.")
+            if number % 1 != 0:
+                raise InputError(f"{self.name} must be a whole number, not {shown(value)}.")
             return int(number)
         return float(number)
 
     def _number(self, value: Any) -> float:
-        if isinstance(value, bool) or not isinstance(value, (int, float)) or math.isnan(value):
-            raise InputError(f"{self.name} must be a number{self._in_unit}, not {value!r}.")
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or value != value:
+            raise InputError(f"{self.name} must be a number{self._in_unit}, not {shown(value)}.")
         if not self.low <= value <= self.high:
-            raise InputError(f"{self.name} must lie in {self.range_text}, not {value!r}.")
+            raise InputError(f"{self.name} must lie in {self.range_text}, not {shown(value)}.")
         return value
 
     @property
@@ -96,6 +100,13 @@ class Parameter:
         return f"{text}; range {self.range_text}" if bounded else text
 
 
+def nearest(name: Any, names: Iterable[str]) -> str:
+    """Return the name that is near to another one, or the two nearest ones if none is."""
+    word, known = str(name)[:100], list(names)
+    close = difflib.get_close_matches(word, known, 1)
+    return " or ".join(close or difflib.get_close_matches(word, known, 2, 0.0))
+
+
 class ParameterGroup:
     """An ordered set of parameters, indexed by name."""
 
@@ -112,9 +123,9 @@ class ParameterGroup:
         try:
             return self._by_name[name]
         except KeyError:
-            near = difflib.get_close_matches(str(name), self._by_name, 1)
-            hint = f"did you mean {near[0]}?" if near else f"known are {', '.join(self.names)}."
-            raise InputError(f"There is no parameter {name!r}; {hint}") from None
+            raise InputError(
+                f"There is no parameter {shown(name)}; did you mean {nearest(name, self.names)}?"
+            ) from None
 
     def __contains__(self, name: str) -> bool:
         """Tell whether a parameter of this name exists."""

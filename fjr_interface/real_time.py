@@ -1,4 +1,4 @@
-"""Real time: the mode of the nodes, what a process does for it, and how lateness is counted."""
+"""Real time: the mode of the nodes, settings of their processes, and the count of late samples."""
 
 from __future__ import annotations
 
@@ -58,11 +58,6 @@ class Histogram:
     def counts(self) -> np.ndarray:
         """Counts, int64 of shape (bins,); the last bin holds everything longer."""
         return self._counts.copy()
-
-    @property
-    def edges_s(self) -> np.ndarray:
-        """Lower edges of the bins in s, float64 of shape (bins,)."""
-        return np.arange(_BINS + 1) * (_BIN_NS * 1e-9)
 
     def quantile_s(self, share: float) -> float:
         """Return the duration in s that this share of all stays below, never above the worst."""

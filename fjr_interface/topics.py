@@ -12,6 +12,13 @@ JOINT = "joint"
 JOINT_STATE = "sensor_msgs/msg/JointState"
 STRING = "std_msgs/msg/String"
 
+NODES = {
+    "simulator": "fjr_sim_node",
+    "controller": "controller_node",
+    "excitation": "excitation_node",
+}
+"""Names of the rig's nodes and the program, also the module, that runs each."""
+
 SIGNAL_DEPTH = 2000
 """History depth of the signal topics: more than a streamed window, so that no reader loses one."""
 
@@ -39,6 +46,9 @@ MOTOR_TORQUE = Signal("u", "motor_torque", "effort", "N m")
 LINK_POSITION = Signal("q", "link_position", "position", "rad")
 SIGNALS = (REFERENCE, MOTOR_POSITION, MOTOR_TORQUE)
 """The three signals of every bag, in the order in which a sample is recorded."""
+
+WRITERS = {"simulator": MOTOR_POSITION, "controller": MOTOR_TORQUE, "excitation": REFERENCE}
+"""The signal that each of the rig's nodes, or what takes its place, publishes."""
 
 EXPERIMENT_TOPIC = "experiment"
 CONTROLLER_TOPIC = "controller"

@@ -1,15 +1,13 @@
-"""`python -m fjr_sim_node` runs the node."""
+"""`python -m fjr_sim_node` and the console script `fjr_sim_node` run the node."""
 
 import sys
 
+from fjr_interface.ros.program import run_module
+
 
 def main() -> int:
-    """Run the node; Ctrl-C ends it quietly while it is still being loaded, too."""
-    try:
-        from .node import main as run
-    except KeyboardInterrupt:
-        return 130
-    return run()
+    """Run the node; return the exit status."""
+    return run_module("fjr_sim_node.node")
 
 
 if __name__ == "__main__":

@@ -10,20 +10,26 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from fjr_interface import ros, topics
-from fjr_interface.errors import InputError
+from fjr_interface import topics
+from fjr_interface.bags.joint_state import JointStateReader, JointStateWriter, LayoutError
 from fjr_interface.experiment import Experiment, controller_from_json
 from fjr_interface.health import OK, WARN, Health, Speed
-from fjr_interface.joint_state import JointStateReader, JointStateWriter, LayoutError
 from fjr_interface.parameters import ParameterGroup
 from fjr_interface.real_time import LOCKSTEP, MODE_PARAMETER, NEVER, REAL_TIME, keep_pauses_out
+from fjr_interface.ros import runtime, spinning
+from fjr_interface.ros.program import Program
+from fjr_interface.waiting import Lack
+from fjr_kit.errors import InputError
 
-from . import effects, faults, plant, rig, services
-from .control import SPEED, STEPS, SimulationControl, State
-from .desk import Desk
-from .lockstep import LockstepDrive
-from .real_time import TORQUE_TIMEOUT, RealTimeDrive
-from .simulator import SIMULATOR
+from . import effects, plant
+from .drive import faults, services
+from .drive.control import SPEED, STEPS, SimulationControl, State
+from .drive.control_services import ControlServices
+from .drive.faulty_wire import wires
+from .drive.lockstep import LockstepDrive
+from .drive.real_time import TORQUE_TIMEOUT, RealTimeDrive
+from .simulation import rig
+from .simulation.simulator import SIMULATOR
 
 PARAMETERS = ParameterGroup(
     *SIMULATOR,
@@ -32,8 +38,8 @@ PARAMETERS = ParameterGroup(
     STEPS,
     TORQUE_TIMEOUT,
     *faults.PARAMETERS,
-    ros.JOINT_PARAMETER,
-    ros.readers_parameter("controller"),
+    runtime.JOINT_PARAMETER,
+    runtime.readers_parameter("controller"),
 )
 
 _LOOK_SAMPLES = 100  # between two looks for subscribers of link_position
@@ -41,7 +47,7 @@ _CLOCK = struct.Struct("<4siI")
 _CDR = b"\x00\x01\x00\x00"
 
 
-class SimulatorNode(ros.RigNode):
+class SimulatorNode(runtime.RigNode):
     """Simulated drive: publishes y and /clock, holds the torque that answers, steps the plant.
 
     Each experiment description starts one realization: plant at rest, noise seeded anew, parameters
@@ -62,28 +68,33 @@ class SimulatorNode(ros.RigNode):
         self._drive: RealTimeDrive | None = None
         self._read_fault()
         self._running = self._publish_link = False
+        self._controllers: frozenset[bytes] = frozenset()
+        self.finished: str | None = None
         self._speed = Speed()
-        self._ticks = self.create_publisher(Clock, "/clock", ros.CLOCK_QOS)
+        self._ticks = self.create_publisher(Clock, "/clock", runtime.CLOCK_QOS)
         self._position = self.create_publisher(
-            JointState, topics.MOTOR_POSITION.topic, ros.SIGNAL_QOS
+            JointState, topics.MOTOR_POSITION.topic, runtime.SIGNAL_QOS
         )
-        self._link = self.create_publisher(JointState, topics.LINK_POSITION.topic, ros.SIGNAL_QOS)
+        self.claim(self._position)
+        self._link = self.create_publisher(
+            JointState, topics.LINK_POSITION.topic, runtime.SIGNAL_QOS
+        )
         self._torque = self.create_subscription(
             JointState,
             topics.MOTOR_TORQUE.topic,
             self._on_torque_in_real_time if self.real_time else self._on_torque,
-            ros.SIGNAL_QOS,
+            runtime.SIGNAL_QOS,
             raw=True,
         )
-        self.create_subscription(
-            String, topics.EXPERIMENT_TOPIC, self._on_experiment, ros.EXPERIMENT_QOS
+        self._description = self.create_subscription(
+            String, topics.EXPERIMENT_TOPIC, self._on_experiment, runtime.EXPERIMENT_QOS
         )
         self.create_subscription(
-            String, topics.CONTROLLER_TOPIC, self._on_controller, ros.EXPERIMENT_QOS
+            String, topics.CONTROLLER_TOPIC, self._on_controller, runtime.EXPERIMENT_QOS
         )
         self._restart = self.create_client(Trigger, "excitation/start")
-        self._desk = Desk(self)
-        services.offer(self, self._desk)
+        self._controls = ControlServices(self)
+        services.offer(self, self._controls)
         self.values_changed()
         compiled = plant.coefficients(self.values), effects.coefficients(self.values)
         rig.hold(rig.at_rest(), 0.0, 1e-3, *compiled)  # compiles it
@@ -108,7 +119,7 @@ class SimulatorNode(ros.RigNode):
         self._experiment = experiment
         if self.real_time:
             self._drive = RealTimeDrive(self.values, experiment)
-            self._in, self._out = faults.wires(self._read_fault(), self.values["fault_seed"])
+            self._in, self._out = wires(self._read_fault(), self.values["fault_seed"])
         else:
             self._lockstep = LockstepDrive(self.values, experiment)
         self.wait_until(self._lacking, self._begin)
@@ -119,14 +130,15 @@ class SimulatorNode(ros.RigNode):
             raise InputError("fault is for mode realtime; a lockstep has none.")
         return plan
 
-    def _lacking(self) -> str | None:
+    def _lacking(self) -> Lack | None:
         if self.real_time and self.control.state == State.STOPPED:
-            return "play: the simulation is stopped"
-        return self.unread(self._position) or self.unwritten(self._torque)
+            return Lack("play: the simulation is stopped", "`fjr play` lets it go on")
+        return self.unread(self._position) or self.unwritten(self._torque, "controller")
 
     def _begin(self) -> None:
         self.get_logger().info(f"{self.run}.".capitalize())
         self._running = True
+        self._controllers = self.writers("controller")
         self._publish_link = self._link.get_subscription_count() > 0
         if self._drive is None:
             self.go_on()
@@ -149,7 +161,7 @@ class SimulatorNode(ros.RigNode):
     def drop_run(self) -> None:
         """Give the realization under way up: plant at rest, nothing published."""
         self.stop_waiting()
-        self._running, self._experiment = False, None
+        self._running, self._experiment, self.finished = False, None, None
         self._lockstep = self._drive = None
         self.due_ns = NEVER
 
@@ -200,9 +212,9 @@ class SimulatorNode(ros.RigNode):
             self._publish_sample(drive)
             return
         if drive.over:
-            self.drop_run()
+            self._finish(drive)
         if drive.over or not self.control.stepping:
-            self._desk.steps_over(done=not self.control.stepping)
+            self._controls.steps_over(done=not self.control.stepping)
         self.go_on()
 
     def _decoded(self, message: bytes) -> tuple[int, float]:
@@ -232,8 +244,17 @@ class SimulatorNode(ros.RigNode):
             drive.command(now_ns, stamp, torque)
         self.due_ns = min(drive.due_ns, self._in.next_ns, self._out.next_ns)
         if drive.over and self.due_ns == NEVER:
-            self.drop_run()
-            self.get_logger().info(drive.describe())
+            self._finish(drive)
+
+    def _finish(self, drive: LockstepDrive | RealTimeDrive) -> None:
+        experiment = self._experiment
+        assert experiment is not None  # a drive plays one
+        self.drop_run()
+        self.finished = (
+            f"finished level {experiment.level}, realization {experiment.realization} "
+            f"({experiment.realization + 1} of {experiment.realizations})"
+        )
+        self.get_logger().info(f"{self.finished}: {drive.describe()}".capitalize())
 
     def health(self) -> Health:
         """Return speed, sticking and, in real time, the lateness of the run."""
@@ -242,14 +263,24 @@ class SimulatorNode(ros.RigNode):
         bad = self._drive is not None and self._drive.troubled
         speed = self._speed.look(drive.samples if drive else 0, self.values["sample_rate_hz"])
         values = {"mode": self.values["mode"], "speed (x real time)": speed, **figures}
-        return Health(WARN if bad else OK, self._desk.status(), values)
+        return Health(WARN if bad else OK, self._controls.status(), values)
 
-    def owed(self) -> str | None:
-        """Return the torque that the simulated drive waits for."""
+    def owed(self) -> Lack | None:
+        """Return the torque that the simulated drive waits for, or before its first run this."""
         drive = self._lockstep
-        return f"the torque of {drive.stamp * 1e-9:.6f} s" if drive and drive.stamp else None
+        if drive is not None and drive.stamp:
+            torque = f"the torque of {drive.stamp * 1e-9:.6f} s"
+            return self.overdue(torque, "controller", self._controllers)
+        if self._experiment or self.finished or self.control.state == State.STOPPED:
+            return None
+        return self.unwritten(self._description, "excitation") or Lack(
+            f"an experiment on {self._description.topic_name}",
+            "the excitation says what it waits for; if nothing, `fjr reset` starts it",
+        )
 
 
 def main() -> int:
     """Run the node; the console script `fjr_sim_node`."""
-    return ros.run(SimulatorNode)
+    return spinning.run(
+        SimulatorNode, program=Program("fjr_sim_node", SimulatorNode.__doc__, PARAMETERS)
+    )

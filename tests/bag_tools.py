@@ -14,12 +14,12 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.rosbag2.enums import CompressionFormat, CompressionMode
 from rosbags.typesys import Stores, get_typestore
 
-from fjr_interface.bag_reader import SignalMap, audit
-from fjr_interface.bag_writer import BagWriter
-from fjr_interface.errors import InputError
+from fjr_interface.bags.joint_state import FIELDS, JointStateWriter
+from fjr_interface.bags.reader import SignalMap, audit
+from fjr_interface.bags.writer import BagWriter
 from fjr_interface.experiment import CUSTOM_DATA_KEY, Experiment
-from fjr_interface.joint_state import FIELDS, JointStateWriter
 from fjr_interface.topics import JOINT, JOINT_STATE, SIGNALS, STRING, Signal
+from fjr_kit.errors import InputError
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 MS = 1_000_000
@@ -158,3 +158,13 @@ def edit(folder: Path, old: str, new: str) -> None:
     text = path.read_text()
     assert old in text
     path.write_text(text.replace(old, new))
+
+
+def boundaries(path: Path) -> list[int]:
+    """Return the offsets at which an MCAP file's top-level records begin, and its end."""
+    data = path.read_bytes()
+    offsets, at = [0], 8
+    while at < len(data) - 8:
+        offsets.append(at)
+        at += 9 + int.from_bytes(data[at + 1 : at + 9], "little")
+    return [*offsets, at, len(data)]

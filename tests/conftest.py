@@ -1,29 +1,86 @@
-"""Fixtures and rules that all tests share."""
+"""Fixtures and rules that all tests share.
+
+The tests of a package stand in the folder of its name, a module's in `test_<module>.py` or, where
+modules work together, in the test named by what they do. What several packages' tests use stands
+beside this file, what those of one use beside them.
+"""
 
 from __future__ import annotations
 
+import os
+import re
+import signal
 import uuid
 from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import settings
-from ros_domain import Peer, Starter, marked_processes, own_domain, wait_for
+from by_hand import Rig
+from hypothesis import HealthCheck, settings
+from paths import ROOT
+from processes import MARK, Starter, marked_processes, wait_for
+from ros_domain import Peer, own_domain
 from typer.testing import CliRunner
+from xdist.scheduler import LoadFileScheduling
 
-from fjr_bringup.cli import app
+from fjr_cli.app import app
 
 # A machine that others share, or a kernel that compiles at its first call, is no fault of a test.
-settings.register_profile("untimed", deadline=None)
+settings.register_profile("untimed", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("untimed")
+
+os.environ[MARK] = uuid.uuid4().hex  # what waits look at, also where a test has no mark of its own
+
+
+GRAPH = re.compile(r"mark\.ros\b|^def \w+\([^)]*\b(?:domain|peer)\b", re.MULTILINE)
+"""What a module holds whose tests play on a ROS graph."""
+
+
+class Dealer(LoadFileScheduling):
+    """Deals whole modules to the workers, and all that play on a ROS graph to one of them.
+
+    Two graphs at once starve each other; what a module's tests share is made once. (Groups of xdist
+    are no help: they go by a node ID that pytest 9 no longer lets it change.)
+    """
+
+    def _split_scope(self, nodeid: str) -> str:
+        module = super()._split_scope(nodeid)
+        return "graphs" if plays_on_graph(module) else module
+
+
+@cache
+def plays_on_graph(module: str) -> bool:
+    """Tell whether a test module, by its path, has tests that play on a ROS graph."""
+    return GRAPH.search((ROOT / module).read_text(encoding="utf-8")) is not None
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Dealer:
+    """Give xdist the dealer of this suite."""
+    return Dealer(config, log)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Keep tests that start ROS nodes in one worker: two graphs at once starve each other."""
+    """Mark what plays on a graph; let graphs and slow modules begin first."""
     for item in items:
-        if item.get_closest_marker("ros"):
-            item.add_marker(pytest.mark.xdist_group("ros"))
+        if "domain" in getattr(item, "fixturenames", ()):
+            item.add_marker("ros")
+    first = {name: rank for rank, name in enumerate(("ros", "slow"))}
+    ranks = {item: [first.get(mark.name, 2) for mark in item.iter_markers()] for item in items}
+    items.sort(key=lambda item: min(ranks[item], default=2))
+
+
+@pytest.fixture(scope="session", autouse=True)
+def default_signals() -> None:
+    """Let no program of a test inherit that the suite ignores a signal, as a background job does.
+
+    What the suite was told to ignore it goes on ignoring, but by a handler: exec() resets those.
+    """
+    for number in (signal.SIGINT, signal.SIGHUP):
+        if signal.getsignal(number) is signal.SIG_IGN:
+            signal.signal(number, lambda *_: None)
 
 
 @pytest.fixture
@@ -38,7 +95,7 @@ def run(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
 def mark(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
     """Mark all processes that the test starts; none of them may be left at its end."""
     mark = uuid.uuid4().hex
-    monkeypatch.setenv("FJR_TEST", mark)
+    monkeypatch.setenv(MARK, mark)
     yield mark
     wait_for(lambda: not marked_processes(mark), f"the end of {marked_processes(mark)}")
 
@@ -54,11 +111,23 @@ def domain(mark: str, monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
 
 
 @pytest.fixture
-def start(domain: int, tmp_path: Path) -> Iterator[Starter]:
-    """Give the test processes started by hand, in its domain."""
+def start_program(mark: str, tmp_path: Path) -> Iterator[Starter]:
+    """Give the test programs that it starts and ends."""
     starter = Starter(tmp_path)
     yield starter
     starter.end()
+
+
+@pytest.fixture
+def start(domain: int, start_program: Starter) -> Starter:
+    """Give the test programs started by hand, in its domain."""
+    return start_program
+
+
+@pytest.fixture
+def rig(peer: Peer) -> Rig:
+    """Give the test ears in the rig."""
+    return Rig(peer)
 
 
 @pytest.fixture

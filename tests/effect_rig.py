@@ -9,7 +9,8 @@ import numpy as np
 
 from controller_node import pd_filtered
 from excitation_node import multisine
-from fjr_sim_node import closed_loop, effects, plant, rig
+from fjr_sim_node import effects, plant
+from fjr_sim_node.simulation import closed_loop, rig
 
 RATE = 1000.0
 PAPER = plant.PLANT.defaults()
@@ -85,7 +86,8 @@ class Rig:
     Attributes:
         plant: bare parameters that differ from the paper's.
         effects: effect parameters by full name.
-        x: state: q, vq, th, vth, q3, v3, lagged torque, built-up link, motor, hysteresis.
+        x: state: q, vq, th, vth, q3, v3, lagged torque, presliding torque of link and motor,
+            hysteresis.
     """
 
     plant: dict[str, float] = field(default_factory=dict)
@@ -128,8 +130,7 @@ class Rig:
             + 0.5 * v["jm"] * vth**2
             + third
             + spring_energy(twist(q, th, get), v, get)
-            + 0.5 * get("presliding_friction.link_rad") * v["fs"] * link**2
-            + 0.5 * get("presliding_friction.motor_rad") * v["fsm"] * motor**2
+            + self.bristle_energy(link, motor, get)
             + 0.5 * get("hysteresis.torque_nm") * get("hysteresis.displacement_rad") * flex**2
             - get("gravity.torque_nm") * math.cos(q + get("gravity.angle_rad"))
             + ripple / cycles * math.cos(angle)
@@ -137,6 +138,26 @@ class Rig:
             * get("cogging.second_ratio")
             / (2.0 * cycles)
             * math.cos(2.0 * angle + get("cogging.second_phase_rad"))
+        )
+
+    def bristle_energy(self, link, motor, get) -> float:
+        """Return what presliding friction holds: F^2/(2 sigma), sigma level over distance (J)."""
+        second = 1.0 + get("position_friction.second_ratio")
+        highest_link = self.values["fs"] + get("stribeck_friction_link.torque_nm")
+        highest_motor = (
+            self.values["fsm"]
+            + get("stribeck_friction_motor.torque_nm")
+            + get("position_friction.amplitude_nm") * second
+            + abs(get("asymmetric_friction.coulomb_nm"))
+        )
+        sides = (
+            (link, highest_link, get("presliding_friction.link_rad")),
+            (motor, highest_motor, get("presliding_friction.motor_rad")),
+        )
+        return sum(
+            0.5 * torque**2 * distance / highest
+            for torque, highest, distance in sides
+            if distance and highest
         )
 
 
@@ -150,12 +171,16 @@ def twist(q, th, get) -> float:
 
 def spring_energy(d, v, get) -> float:
     """Return the energy of the transmission's spring behind gap and soft zone (J)."""
+
+    def held(reduced):
+        return 0.5 * v["k0"] * reduced**2 + 0.25 * v["k1"] * reduced**4
+
     d = max(abs(d) - get("backlash.half_gap_rad"), 0.0)
     zone, ratio = get("piecewise_stiffness.zone_rad"), get("piecewise_stiffness.soft_ratio")
     inside = min(d, zone)
-    beyond = d - inside
-    linear = 0.5 * ratio * inside**2 + ratio * inside * beyond + 0.5 * beyond**2
-    return v["k0"] * linear + 0.25 * v["k1"] * d**4
+    # the spring sees ratio * d within the zone: over d it takes 1/ratio of its own energy
+    slack = held(ratio * inside) * (1.0 / ratio - 1.0) if ratio else 0.0
+    return held(d - (1.0 - ratio) * inside) + slack
 
 
 def multisine_reference(amplitude: float, seed: int = 1) -> np.ndarray:

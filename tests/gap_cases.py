@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,14 +11,14 @@ import numpy as np
 
 from controller_node import pd_filtered
 from excitation_node import multisine
-from fjr_interface.bag_writer import BagWriter
+from fjr_interface.bags.writer import BagWriter
+from fjr_records.noise import noise_levels
+from fjr_records.recorded import RecordedExperiment, RecordedRealization
 from fjr_sim_node.plant import PLANT
-from fjr_sim_node.simulator import SIMULATOR, run_realization
-from gap_diagnosis.fits import Fitter
-from gap_diagnosis.model import Model, Simulator
-from gap_diagnosis.noise import noise_levels
-from gap_diagnosis.records import Realization, RecordedExperiment
-from gap_diagnosis.search_space import TOLERANCE
+from fjr_sim_node.simulation.simulator import SIMULATOR, run_realization
+from gap_diagnosis.model.simulated_rig import Model, Simulator
+from gap_diagnosis.which.fits import Fitter
+from gap_diagnosis.which.search_space import TOLERANCE
 
 LEVELS_RAD = (2e-3, 7e-3, 2e-2)
 NOISE_RAD = 2e-5
@@ -101,7 +101,7 @@ def simulate_case(
             run = run_realization(rig, experiment)
             shape = (-1, experiment.samples_per_period)
             done.append(
-                Realization(
+                RecordedRealization(
                     f"level_{level}_realization_{number:03d}",
                     experiment,
                     run.reference.reshape(shape),
@@ -112,6 +112,32 @@ def simulate_case(
             )
     truth = Model.nominal(rig).with_effects(effects)
     return Case(RecordedExperiment(f"case {seed}", tuple(done)), rig, truth)
+
+
+def vary(case: Case, factors: Sequence[Mapping[str, float]]) -> RecordedExperiment:
+    """Record a case again, each bag with its own factors on the rig's parameters."""
+    again = []
+    for r, changed in zip(case.recorded.realizations, factors, strict=True):
+        rig = dict(case.rig) | {name: f * case.rig[name] for name, f in changed.items()}
+        run = run_realization(rig, r.experiment)
+        shape = r.position.shape
+        again.append(
+            replace(r, position=run.position.reshape(shape), torque=run.torque.reshape(shape))
+        )
+    return RecordedExperiment(case.recorded.source, tuple(again))
+
+
+def with_other_noise(case: Case, seed: int) -> RecordedExperiment:
+    """Record a case again, with other encoder noise in the loop."""
+    rig = {**case.rig, "noise_seed": seed}
+    again = []
+    for r in case.recorded.realizations:
+        run = run_realization(rig, r.experiment)
+        shape = r.position.shape
+        again.append(
+            replace(r, position=run.position.reshape(shape), torque=run.torque.reshape(shape))
+        )
+    return RecordedExperiment(case.recorded.source, tuple(again))
 
 
 def write_bags(case: Case, folder: Path) -> Path:

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bla_analyzer.lines import Lines, classify
-from bla_analyzer.spectra import PeriodSums, RealizationSpectra
+from fjr_records.lines import Lines, classify
+from fjr_records.spectra import PeriodSums, RealizationSpectra
 
 RATE_HZ = 100.0
 GAIN = 400.0

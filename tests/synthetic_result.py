@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 from scipy.stats import f as f_distribution
 
-from bla_analyzer.result import (
+from bla_analyzer.results.result import (
     BlaEstimate,
-    Check,
     Comparison,
     LevelResult,
     LineLevels,
     Result,
-    TimeSignals,
 )
+from fjr_kit.check import Check
+from fjr_records.realization import TimeSignals
 
 RATE, PERIOD, M, P = 1000.0, 10_000, 7, 2
 
@@ -108,13 +108,16 @@ def _v(g, g0, keep):
 
 
 def _comparison(name, description, bla, g0) -> Comparison:
-    everywhere = np.ones(len(g0), bool)
+    mean, median = _v(bla.g, g0, np.ones(len(g0), bool))
+    mean_above, median_above = _v(bla.g, g0, bla.frequency_hz >= 1.0)
     return Comparison(
-        name,
-        description,
-        g0,
-        *_v(bla.g, g0, everywhere),
-        *_v(bla.g, g0, bla.frequency_hz >= 1.0),
+        name=name,
+        description=description,
+        g0=g0,
+        v_mean=mean,
+        v_median=median,
+        v_mean_above_1hz=mean_above,
+        v_median_above_1hz=median_above,
     )
 
 
@@ -196,24 +199,23 @@ def make_result(amplitudes=(1e-3, 7e-3, 3e-2), periods=P, checks=None, **changes
 def _checks(levels: int) -> tuple[Check, ...]:
     checks = [
         Check(
-            "periodicity",
-            level,
-            m,
-            True,
-            1e-4 * (1 + m),
-            1e-2,
-            f"level {level}, realization {m}: periods differ by {1e-4 * (1 + m):.1e}.",
+            name="periodicity",
+            level=level,
+            realization=m,
+            passed=True,
+            value=1e-4 * (1 + m),
+            limit=1e-2,
+            sentence=f"level {level}, realization {m}: periods differ by {1e-4 * (1 + m):.1e}.",
         )
         for level in range(levels)
         for m in range(M)
     ]
     failed = Check(
-        "input_snr",
-        0,
-        None,
-        False,
-        0.04,
-        0.01,
-        "level 0: Var(U)/|U|^2 reaches 0.04 at 3 lines; those lines are flagged.",
+        name="input_snr",
+        level=0,
+        passed=False,
+        value=0.04,
+        limit=0.01,
+        sentence="level 0: Var(U)/|U|^2 reaches 0.04 at 3 lines; those lines are flagged.",
     )
     return (*checks, failed)

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 import setuptools
 from catkin_pkg.package import Package, parse_package
+from paths import ROOT
 
-ROOT = Path(__file__).parents[1]
 WORKSPACE = ROOT / "ros_ws"
 PACKAGES = sorted(path.name for path in (WORKSPACE / "src").iterdir())
 CONFIG = WORKSPACE / "src/fjr_bringup/config"

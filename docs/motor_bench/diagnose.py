@@ -12,10 +12,11 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
-from gap_diagnosis.fits import Fit, Fitter
-from gap_diagnosis.misfit import Misfit
-from gap_diagnosis.model import Model, Simulator
-from gap_diagnosis.records import Realization, RecordedExperiment, read_experiment, spectrum
+from fjr_records.recorded import RecordedExperiment, RecordedRealization, read_experiment
+from fjr_records.spectra import line_spectrum
+from gap_diagnosis.model.misfit import Misfit
+from gap_diagnosis.model.simulated_rig import Model, Simulator
+from gap_diagnosis.which.fits import Fit, Fitter
 
 TOLERANCE = 2.3  # friction is not known at all: every value may be a factor of sixty off
 BANDS = ((11, 40), (40, 60), (60, 90), (90, 150), (150, 250))
@@ -32,7 +33,7 @@ def held(torque: np.ndarray) -> np.ndarray:
     return np.fft.irfft(lines, flat.size).reshape(torque.shape)
 
 
-def nominal(record: Realization, lines: int) -> dict[str, float]:
+def nominal(record: RecordedRealization, lines: int) -> dict[str, float]:
     """Return a two-mass nominal from antiresonance, resonance and low-frequency gain of a record.
 
     Friction values are guesses.
@@ -63,7 +64,7 @@ class Bench:
     fitter: Fitter
 
 
-def prepare(a: Realization, b: Realization, values: dict[str, float]) -> Bench:
+def prepare(a: RecordedRealization, b: RecordedRealization, values: dict[str, float]) -> Bench:
     """Return a fitter that trains on record A and judges on record B."""
     recorded = RecordedExperiment("bench", (a, b))
     simulator = Simulator(recorded)
@@ -78,7 +79,7 @@ def prepare(a: Realization, b: Realization, values: dict[str, float]) -> Bench:
 
 def relative_errors(bench: Bench, model: Model, index: int) -> np.ndarray:
     """Return |prediction error| of motor and load angle over frequency, (2, lines), rad."""
-    run = spectrum(bench.simulator.many([model], [index])[0, 0], bench.recorded.lines)
+    run = line_spectrum(bench.simulator.many([model], [index])[0, 0], bench.recorded.lines)
     return np.abs(run - Misfit(bench.recorded, bench.simulator, bench.noise, [index]).measured[0])
 
 
@@ -165,8 +166,7 @@ def main(folder_a: str, folder_b: str, out: str) -> None:
         print(f"{name}: A {misfits[0]:.0f}, B {misfits[1]:.0f}, {found}")
 
     start = Model.nominal(values)
-    train, judged = fitter.judge((), start)
-    print(f"nominal: A {train / fitter.train.size:.0f}, B {judged / fitter.held.size:.0f}", values)
+    print(f"nominal: A {fitter.train.chi2(start):.0f}, B {fitter.held.chi2(start):.0f}", values)
     refit = fitter.refit()
     show("refit", refit)
     single = {

@@ -2,15 +2,7 @@
 
 import sys
 
-
-def main() -> int:
-    """Run the node; Ctrl-C ends it quietly while it is still being loaded, too."""
-    try:
-        from .node import main as run
-    except KeyboardInterrupt:
-        return 130
-    return run()
-
+from fjr_interface.ros.program import run_module
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(run_module("fjr_bringup.bridge.node"))

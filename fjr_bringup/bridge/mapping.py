@@ -12,9 +12,9 @@ import math
 from collections import deque
 from dataclasses import dataclass
 
-from fjr_interface.errors import InputError
-from fjr_interface.joint_state import Layout, LayoutError
+from fjr_interface.bags.joint_state import Layout, LayoutError
 from fjr_interface.topics import SIGNAL_DEPTH
+from fjr_kit.errors import InputError
 
 THRESHOLD = (
     "the hardware's trigger_joint_command_threshold holds back commands that differ little from "

@@ -12,10 +12,13 @@ import sys
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 
-from fjr_interface import ros, topics
-from fjr_interface.errors import InputError
-from fjr_interface.joint_state import JointStateReader, JointStateWriter, LayoutError
+from fjr_interface import topics
+from fjr_interface.bags.joint_state import JointStateReader, JointStateWriter, LayoutError
 from fjr_interface.parameters import Parameter, ParameterGroup
+from fjr_interface.ros import runtime, spinning
+from fjr_interface.ros.program import Program, refuse
+from fjr_interface.waiting import Lack, start
+from fjr_kit.errors import InputError
 
 from .mapping import Answers, CommandReader, Observer, Sample
 
@@ -43,7 +46,7 @@ SERVE = ParameterGroup(
         1,
         10,
     ),
-    ros.readers_parameter("simulator"),
+    runtime.readers_parameter("simulator"),
 )
 OBSERVE = ParameterGroup(
     *_TOPICS,
@@ -52,13 +55,13 @@ OBSERVE = ParameterGroup(
         "reference_topic", "", "", "JointState whose position is the reference; empty without"
     ),
     Parameter("reference_joint", "", "", "Joint in those messages; empty for their first position"),
-    ros.readers_parameter(),
+    runtime.readers_parameter(),
 )
 
 _RESEND_S = 0.2
 
 
-class ServingBridge(ros.RigNode):
+class ServingBridge(runtime.RigNode):
     """Gives positions to a controller manager as joint states, and its commands back as torques.
 
     Velocity is the backward difference of the position, effort the torque held until then. With an
@@ -84,18 +87,19 @@ class ServingBridge(ros.RigNode):
         self._position: tuple[int, float] | None = None
         self._ready = False
         self._before, self._held = (0, 0.0), 0.0
-        states, signal = str(values["joint_states_topic"]), ros.SIGNAL_QOS
+        states, signal = str(values["joint_states_topic"]), runtime.SIGNAL_QOS
         self._states = self.create_publisher(JointState, states, signal)
         self._torque = self.create_publisher(JointState, topics.MOTOR_TORQUE.topic, signal)
+        self.claim(self._torque)
         self._commands = self._hear(self._topic, self._on_command)
-        self._hear(topics.MOTOR_POSITION.topic, self._on_position)
+        self._positions = self._hear(topics.MOTOR_POSITION.topic, self._on_position)
         if reference:
             self._hear(topics.REFERENCE.topic, self._on_reference)
         if echo:
             self.call_every(_RESEND_S, self._send_again)
 
     def _hear(self, topic, callback):
-        return self.create_subscription(JointState, topic, callback, ros.SIGNAL_QOS, raw=True)
+        return self.create_subscription(JointState, topic, callback, runtime.SIGNAL_QOS, raw=True)
 
     def _on_reference(self, message: bytes) -> None:
         stamp, value = _decoded(self._decode, message, topics.REFERENCE.topic)
@@ -113,11 +117,13 @@ class ServingBridge(ros.RigNode):
         else:
             self.wait_until(self._lacking, self._begin)
 
-    def _lacking(self) -> str | None:
-        if missing := self.unread(self._torque) or self.unwritten(self._commands):
+    def _lacking(self) -> Lack | None:
+        manager = "the controller manager"
+        if missing := self.unread(self._torque) or self.unwritten(self._commands, manager):
             return missing
         if self._states.get_subscription_count() < 1:
-            return f"a controller manager that subscribes to {self._states.topic_name}"
+            states = self._states.topic_name
+            return Lack(f"a controller manager that subscribes to {states}", start(manager))
         return None
 
     def _begin(self) -> None:
@@ -157,14 +163,16 @@ class ServingBridge(ros.RigNode):
             self._held = torque
             self._torque.publish(self._encode(stamp, torque))
 
-    def owed(self) -> str | None:
-        """Return what a position waits for."""
+    def owed(self) -> Lack | None:
+        """Return what a position waits for, or that nobody publishes positions."""
         if self._position is not None:
-            return f"the reference of {self._position[0] * 1e-9:.6f} s"
-        return self._answers.missing(self._topic, self._joint)
+            return Lack(f"the reference of {self._position[0] * 1e-9:.6f} s", start("excitation"))
+        if missing := self._answers.missing(self._topic, self._joint):
+            return Lack(missing)
+        return self.unwritten(self._positions, "simulator")
 
 
-class ObservingBridge(ros.RigNode):
+class ObservingBridge(runtime.RigNode):
     """Publishes what a rig under ros2_control does as reference, motor_position and motor_torque.
 
     It only listens: samples are numbered from 1 and stamped k Ts, as the contract wants them. A rig
@@ -192,15 +200,17 @@ class ObservingBridge(ros.RigNode):
             signal.symbol: JointStateWriter(signal.field, joint).encode for signal in signals
         }
         self._writers = {
-            signal.symbol: self.create_publisher(JointState, signal.topic, ros.SIGNAL_QOS)
+            signal.symbol: self.create_publisher(JointState, signal.topic, runtime.SIGNAL_QOS)
             for signal in signals
         }
+        for writer in self._writers.values():
+            self.claim(writer)
         self.wait_until(self._lacking, self._begin)
 
-    def _lacking(self) -> str | None:
+    def _lacking(self) -> Lack | None:
         for topic in self._inputs:
             if self.count_publishers(topic) < 1:
-                return f"a publisher of {topic}"
+                return Lack(f"a publisher of {topic}", "start the rig under ros2_control")
         return next(filter(None, map(self.unread, self._writers.values())), None)
 
     def _begin(self) -> None:
@@ -249,13 +259,19 @@ def _decoded(decode, message: bytes, topic: str) -> tuple[int, float]:
         raise InputError(f"Topic {topic}: {error}; name the joint as the messages do.") from None
 
 
-BRIDGES = {"serve": ServingBridge, "observe": ObservingBridge}
+BRIDGES = {"serve": (ServingBridge, SERVE), "observe": (ObservingBridge, OBSERVE)}
+_NAME = "python -m fjr_bringup.bridge"
 
 
 def main() -> int:
     """Run the bridge in the direction that the first argument names."""
-    direction = sys.argv[1] if len(sys.argv) > 1 else ""
-    if direction not in BRIDGES:
-        print("error: say serve or observe before --ros-args.", file=sys.stderr)
-        return 2
-    return ros.run(BRIDGES[direction])
+    direction, *arguments = sys.argv[1:] or [""]
+    if direction in BRIDGES:
+        bridge, parameters = BRIDGES[direction]
+        program = Program(f"{_NAME} {direction}", bridge.__doc__, parameters)
+        return spinning.run(bridge, program=program, arguments=arguments)
+    if Program.wants_help(sys.argv[1:]):
+        for direction, (bridge, parameters) in BRIDGES.items():
+            print(Program(f"{_NAME} {direction}", bridge.__doc__, parameters).help(), end="\n\n")
+        return 0
+    return refuse(InputError("say serve or observe before --ros-args."))

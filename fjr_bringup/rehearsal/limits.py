@@ -1,4 +1,4 @@
-"""From what a rehearsal measured and predicts to GO or NO-GO, with a reason for every limit."""
+"""Limits of a rehearsal: from its measurements and predictions to GO or NO-GO, with reasons."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from bla_analyzer.result import Check
 from fjr_interface.parameter_file import load_parameter_file
 from fjr_interface.parameters import Parameter, ParameterGroup
+from fjr_kit.check import Check
 
 from .prediction import Prediction
 from .timing import LoopTiming, TopicTiming
@@ -77,11 +77,6 @@ class LimitsFile:
         )
 
 
-def go(checks: tuple[Check, ...]) -> bool:
-    """Return whether every check passed."""
-    return all(check.passed for check in checks)
-
-
 def judge(
     timing: LoopTiming,
     prediction: Prediction | None,
@@ -101,7 +96,7 @@ def judge(
         checks += _prediction_checks(prediction, limits)
     if response is not None:
         checks.append(
-            _check(
+            limit_check(
                 "response",
                 response,
                 limits["response"],
@@ -112,35 +107,35 @@ def judge(
     return tuple(checks)
 
 
-def _check(name: str, value: float, limit: float, what: str) -> Check:
+def limit_check(name: str, value: float, limit: float, what: str) -> Check:
     """Return a check; NaN fails, since what could not be measured is no reason to go."""
-    passed = value <= limit
-    return Check(name, None, None, passed, float(value), float(limit), f"{name}: {what}.")
+    sentence = f"{name}: {what}."
+    return Check(name=name, passed=value <= limit, value=value, limit=limit, sentence=sentence)
 
 
 def _timing_checks(timing: LoopTiming, limits: Mapping[str, Any]) -> Iterator[Check]:
     rate, latency = timing.sample_rate_hz, timing.latency
     if not timing.delay_s.size:
-        yield _check("answered", 1.0, 0.0, "no position was answered by a torque")
+        yield limit_check("answered", 1.0, 0.0, "no position was answered by a torque")
     error = abs(timing.position.rate_hz / rate - 1.0)
     words = f"positions come at {timing.position.rate_hz:.3f} Hz where {rate:g} Hz is due"
-    yield _check("rate_error", error, limits["rate_error"], words)
+    yield limit_check("rate_error", error, limits["rate_error"], words)
     jitter = timing.position.jitter
     words = f"99 % of the positions keep their time within {_ms(jitter.p99)}"
-    yield _check("jitter", jitter.p99, limits["jitter_p99_s"], words)
+    yield limit_check("jitter", jitter.p99, limits["jitter_p99_s"], words)
     words = f"99 % of the torques answer within {_ms(latency.p99)} (99.9 %: {_ms(latency.p999)})"
-    yield _check("latency", latency.p99, limits["latency_p99_s"], words)
+    yield limit_check("latency", latency.p99, limits["latency_p99_s"], words)
     words = f"the slowest torque took {_ms(latency.worst)}"
-    yield _check("latency_worst", latency.worst, limits["latency_worst_s"], words)
+    yield limit_check("latency_worst", latency.worst, limits["latency_worst_s"], words)
     share = timing.late / max(latency.count, 1)
     words = f"{timing.late} of {latency.count} torques came later than the next position was due"
-    yield _check("late", share, limits["late_share"], words)
+    yield limit_check("late", share, limits["late_share"], words)
     if timing.clocks_differ:
         words = (
             "messages were received before they were sent, so the clocks of two machines differ "
             "and latency is not known: synchronise them"
         )
-        yield _check("clocks", 1.0, 0.0, words)
+        yield limit_check("clocks", 1.0, 0.0, words)
 
 
 def _damage_checks(timing: LoopTiming, limits: Mapping[str, Any]) -> Iterator[Check]:
@@ -153,16 +148,18 @@ def _damage_checks(timing: LoopTiming, limits: Mapping[str, Any]) -> Iterator[Ch
              ("unordered", "messages out of order"))  # fmt: skip
     for kind, words in kinds:
         counts = {name: getattr(topic, kind) for name, topic in topics.items()}
-        yield _check(kind, sum(counts.values()), limits[kind], f"{words}: {_counts(counts)}")
+        yield limit_check(kind, sum(counts.values()), limits[kind], f"{words}: {_counts(counts)}")
     words = f"{timing.unanswered} positions got no torque"
-    yield _check("unanswered", timing.unanswered, limits["lost"], words)
+    yield limit_check("unanswered", timing.unanswered, limits["lost"], words)
     words = f"{timing.late_references} references came after their position"
-    yield _check("late_references", timing.late_references, limits["lost"], words)
+    yield limit_check("late_references", timing.late_references, limits["lost"], words)
     counts = {"reference": timing.reference.clock_jumps, "position": timing.position.clock_jumps}
     words = f"jumps of the stamps: {_counts(counts)}"
-    yield _check("clock_jumps", sum(counts.values()), 0.0, words)
+    yield limit_check("clock_jumps", sum(counts.values()), 0.0, words)
     counts = {name: topic.not_finite for name, topic in topics.items()}
-    yield _check("not_finite", sum(counts.values()), 0.0, f"values not finite: {_counts(counts)}")
+    yield limit_check(
+        "not_finite", sum(counts.values()), 0.0, f"values not finite: {_counts(counts)}"
+    )
 
 
 def _prediction_checks(prediction: Prediction, limits: Mapping[str, Any]) -> Iterator[Check]:
@@ -171,17 +168,17 @@ def _prediction_checks(prediction: Prediction, limits: Mapping[str, Any]) -> Ite
         f"the delay (99 %: {_ms(p.delay_p99_s)}) uses {_percent(p.margin_share)} of the loop's "
         f"delay margin of {_ms(p.delay_margin_s)}"
     )
-    yield _check("delay_margin", p.margin_share, limits["delay_margin_share"], words)
+    yield limit_check("delay_margin", p.margin_share, limits["delay_margin_share"], words)
     words = f"the delay will bias the BLA's magnitude by up to {p.worst_bias_db:.2f} dB"
-    yield _check("bias_db", p.worst_bias_db, limits["bias_db"], words)
+    yield limit_check("bias_db", p.worst_bias_db, limits["bias_db"], words)
     words = f"the delay will bias the BLA's phase by up to {p.worst_bias_deg:.1f} degrees"
-    yield _check("bias_deg", p.worst_bias_deg, limits["bias_deg"], words)
+    yield limit_check("bias_deg", p.worst_bias_deg, limits["bias_deg"], words)
 
 
 def _motion_checks(timing: LoopTiming, limits: Mapping[str, Any]) -> Iterator[Check]:
     torque, position = timing.torque.greatest, timing.position.greatest
-    yield _check("torque", torque, limits["torque_nm"], f"torque reached {torque:.3g} N m")
-    yield _check(
+    yield limit_check("torque", torque, limits["torque_nm"], f"torque reached {torque:.3g} N m")
+    yield limit_check(
         "position", position, limits["position_rad"], f"position reached {position:.3g} rad"
     )
 

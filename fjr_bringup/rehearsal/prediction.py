@@ -1,4 +1,4 @@
-"""What the measured delay of the loop will do: how much of its margin is gone, how the BLA is off.
+"""Effect of the loop's measured delay: the share of the delay margin it uses, and the BLA's bias.
 
 Both are computed for linear plants. The margin that counts is that of the plant with viscous
 friction only, which is what moves when everything slides; beside it stands the margin of the linear
@@ -10,25 +10,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from pydantic import computed_field
 
 from controller_node import transfer_function
 from controller_node.transfer_function import TransferFunction
-from fjr_interface.errors import InputError
 from fjr_interface.experiment import Experiment
-from fjr_sim_node.delayed_loop import delay_margin, delayed_g0
-from fjr_sim_node.linear import g0
-from fjr_sim_node.statistical_linearisation import linearise_experiment
+from fjr_kit.errors import InputError
+from fjr_kit.result_types import Array, EqualArrays, Number, Unit
+from fjr_sim_node.theory.delayed_loop import delay_margin, delayed_g0
+from fjr_sim_node.theory.linear import g0
+from fjr_sim_node.theory.statistical_linearisation import linearise_experiment
 
 _QUANTILES = 200
 _NO_FRICTION = {"fv": 0.0, "fvm": 0.0}
 
 
-@dataclass(frozen=True)
-class Prediction:
+class Prediction(EqualArrays):
     """What the delay does.
 
     Attributes:
@@ -42,29 +42,32 @@ class Prediction:
         bias_deg: (F,), the same for the phase.
     """
 
-    delay_median_s: float
-    delay_p99_s: float
-    delay_margin_s: float
-    delay_margin_equivalent_s: float
-    delay_margin_frictionless_s: float
-    frequency_hz: np.ndarray
-    bias_db: np.ndarray
-    bias_deg: np.ndarray
+    delay_median_s: Annotated[Number, Unit("s")]
+    delay_p99_s: Annotated[Number, Unit("s")]
+    delay_margin_s: Annotated[Number, Unit("s")]
+    delay_margin_equivalent_s: Annotated[Number, Unit("s")]
+    delay_margin_frictionless_s: Annotated[Number, Unit("s")]
+    frequency_hz: Annotated[np.ndarray, Array("Hz")]
+    bias_db: Annotated[np.ndarray, Array("dB")]
+    bias_deg: Annotated[np.ndarray, Array("deg")]
 
+    @computed_field  # type: ignore[prop-decorator]
     @property
-    def margin_share(self) -> float:
+    def margin_share(self) -> Annotated[Number, Unit("1")]:
         """Share of the delay margin that 99 % of the samples use up at most; inf if it is zero."""
         if self.delay_margin_s == 0.0:
             return math.inf
         return self.delay_p99_s / self.delay_margin_s
 
+    @computed_field  # type: ignore[prop-decorator]
     @property
-    def worst_bias_db(self) -> float:
+    def worst_bias_db(self) -> Annotated[Number, Unit("dB")]:
         """Greatest magnitude of the bias in dB."""
         return float(np.abs(self.bias_db).max())
 
+    @computed_field  # type: ignore[prop-decorator]
     @property
-    def worst_bias_deg(self) -> float:
+    def worst_bias_deg(self) -> Annotated[Number, Unit("deg")]:
         """Greatest magnitude of the bias in degrees."""
         return float(np.abs(self.bias_deg).max())
 
@@ -89,14 +92,14 @@ def predict(values: Mapping[str, Any], experiment: Experiment, delay_s: np.ndarr
     frequency_hz = np.array(experiment.excited_harmonics) * experiment.base_frequency_hz
     bias_db, bias_deg = bla_bias(equivalent or viscous, frequency_hz, rate, delay_s)
     return Prediction(
-        float(np.median(delay_s)),
-        float(np.quantile(delay_s, 0.99, method="higher")),
-        delay_margin(viscous, law, rate),
-        equivalent_margin_s,
-        delay_margin(viscous | _NO_FRICTION, law, rate),
-        frequency_hz,
-        bias_db,
-        bias_deg,
+        delay_median_s=float(np.median(delay_s)),
+        delay_p99_s=float(np.quantile(delay_s, 0.99, method="higher")),
+        delay_margin_s=delay_margin(viscous, law, rate),
+        delay_margin_equivalent_s=equivalent_margin_s,
+        delay_margin_frictionless_s=delay_margin(viscous | _NO_FRICTION, law, rate),
+        frequency_hz=frequency_hz,
+        bias_db=bias_db,
+        bias_deg=bias_deg,
     )
 
 

@@ -1,4 +1,4 @@
-"""What `fjr rehearse` does: plays one realization in real time, observes it and judges it."""
+"""A rehearsal: plays one realization in real time, observes the loop and judges it."""
 
 from __future__ import annotations
 
@@ -13,23 +13,28 @@ from typing import Any
 import numpy as np
 
 from bla_analyzer.output import provenance
-from bla_analyzer.result import Check
+from fjr_interface.bags.folder_names import bag_folder
 from fjr_interface.experiment import Experiment
-from fjr_sim_node.faults import NODE, FaultPlan
-from fjr_sim_node.simulator import run_realization
+from fjr_interface.ros import fast_dds
+from fjr_interface.topics import NODES
+from fjr_kit.atomic import write_whole
+from fjr_kit.check import Check
+from fjr_kit.folder_lock import locked_folder
+from fjr_kit.processes import ProcessGroup
+from fjr_kit.stopping import Interruption
+from fjr_sim_node.drive.faults import NODE, FaultPlan
+from fjr_sim_node.simulation.simulator import run_realization
 
-from ..campaign import CAMPAIGN_FILE, bag_folder
-from ..domain import claimed_domain, reach
-from ..graph_run import ros_arguments, save_roles
-from ..interruption import Interruption
-from ..processes import NODES, ProcessGroup
-from .conductor import Killing, Played, RehearsalConductor
-from .limits import judge
-from .options import EXTERNAL, SIMULATED, Options, Plan, check_options
+from ..campaign.plan import CAMPAIGN_FILE
+from ..graph.domain import claimed_domain, reach
+from ..graph.graph_run import ros_arguments, save_roles
+from .limits import judge, limit_check
+from .loop_progress import RehearsalProgress
 from .prediction import predict
-from .progress import RehearsalProgress
+from .rehearsal_run import Killing, Played, RehearsalConductor
 from .report import render
-from .result import Rehearsal, to_json
+from .request import EXTERNAL, SIMULATED, Options, Plan, check_options
+from .result import Rehearsal
 from .safety import onset_ns, safe_state
 from .timing import loop_timing
 
@@ -47,9 +52,18 @@ def rehearse(options: Options, progress: RehearsalProgress) -> tuple[Rehearsal, 
         KeyboardInterrupt: Ctrl-C before anything was measured.
     """
     plan = check_options(options)
+    if plan.longer:
+        progress.say(plan.longer)
+    with locked_folder(plan.folder):
+        return _rehearse(plan, progress)
+
+
+def _rehearse(plan: Plan, progress: RehearsalProgress) -> tuple[Rehearsal, Path, bool]:
+    options = plan.options
     plan.campaign.open_folder(plan.folder)
     if options.network:
         os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "SUBNET"
+        fast_dds.set_defaults(os.environ)
     with Interruption() as interruption, claimed_domain() as domain:
         progress.say(f"ROS domain {domain}; {reach()}.")
         with Graph(plan, progress, interruption) as graph:
@@ -138,8 +152,10 @@ def judged(plan: Plan, played: Played, domain: int) -> Rehearsal:
         )
     checks = judge(timing, prediction, limits, response)
     course = (
-        _yes_or_no("course", played.whole, played.ended),
-        _yes_or_no("trip", played.trip is None, played.trip or "the controller has not tripped"),
+        limit_check("course", not played.whole, 0.0, played.ended),
+        limit_check(
+            "trip", played.trip is not None, 0.0, played.trip or "the controller has not tripped"
+        ),
     )
     return Rehearsal(
         drive=plan.options.drive,
@@ -157,11 +173,9 @@ def judged(plan: Plan, played: Played, domain: int) -> Rehearsal:
         bag=None if played.bag_damage else bag_folder(plan.folder, 0, 0).name,
         bag_damage=played.bag_damage,
         experiment=experiment.model_dump(by_alias=True),
+        machine=played.machine,
+        signals=played.arrivals,
     )
-
-
-def _yes_or_no(name: str, passed: bool, words: str) -> Check:
-    return Check(name, None, None, passed, float(not passed), 0.0, f"{name}: {words}.")
 
 
 def _safe_state(plan: Plan, played: Played) -> tuple[Check, ...]:
@@ -202,8 +216,8 @@ def distance(
 
 
 def _write(found: Rehearsal, folder: Path, command: str | None) -> Path:
-    (folder / RESULT).write_text(to_json(found), encoding="utf-8")
+    write_whole(folder / RESULT, found.to_json())
     date = f"{datetime.now():%Y-%m-%d %H:%M:%S}"
     report = folder / REPORT
-    report.write_text(render(found, provenance(command, date)), encoding="utf-8")
+    write_whole(report, render(found, provenance(command, date)))
     return report

@@ -2,26 +2,21 @@
 
 from __future__ import annotations
 
-import dataclasses
-import math
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Literal
 
 import numpy as np
+from pydantic import Field, computed_field
 
-from bla_analyzer.result import Check
-from bla_analyzer.result_json import pretty
+from fjr_kit.check import Check, failed
+from fjr_kit.result_types import Document, FreeForm, Number, Unit
 
-from .limits import go
+from .advice import advice
+from .machine import Machine
 from .prediction import Prediction
-from .timing import EDGES_S, Distribution, LoopTiming
-
-SCHEMA = "fjr_rig/rehearsal/1"
+from .timing import Distribution, LoopTiming
 
 
-@dataclass(frozen=True)
-class Rehearsal:
+class Rehearsal(Document):
     """What a rehearsal found.
 
     Attributes:
@@ -40,28 +35,34 @@ class Rehearsal:
         bag: path of the bag, relative to the folder; None if it is not whole.
         bag_damage: why there is none.
         experiment: description of what was played, as plain data.
+        machine: what the machine did.
+        signals: all messages of r, y and u in the order of their arrival, each of dtype RECORD;
+            not written.
     """
 
+    schema_name: Literal["fjr_rig/rehearsal/1"] = Field("fjr_rig/rehearsal/1", alias="schema")
     drive: str
     hardware: bool
     domain: int
     reach: str
-    planned_s: float
+    planned_s: Annotated[Number, Unit("s")]
     ended: str
-    fault: Mapping[str, Any]
+    fault: FreeForm
     fault_seed: int
     timing: LoopTiming
     prediction: Prediction | None
     checks: tuple[Check, ...]
-    limits: Mapping[str, Any]
+    limits: FreeForm
     bag: str | None
     bag_damage: str | None
-    experiment: Mapping[str, Any]
+    experiment: FreeForm
+    machine: Machine
+    signals: list[np.ndarray] = Field(exclude=True)
 
     @property
     def go(self) -> bool:
         """Whether every check passed."""
-        return go(self.checks)
+        return not failed(self.checks)
 
     @property
     def headline(self) -> str:
@@ -70,58 +71,23 @@ class Rehearsal:
             return f"GO: all {len(self.checks)} limits are kept."
         return f"NO-GO: {len(self.reasons)} of {len(self.checks)} limits are not kept."
 
+    @computed_field  # type: ignore[prop-decorator]
+    @property
+    def verdict(self) -> Literal["GO", "NO-GO"]:
+        """The verdict."""
+        return "GO" if self.go else "NO-GO"
+
+    @computed_field  # type: ignore[prop-decorator]
     @property
     def reasons(self) -> list[str]:
         """Why it is NO-GO: the sentences of the checks that failed."""
-        return [check.sentence for check in self.checks if not check.passed]
+        return [check.sentence for check in failed(self.checks)]
 
-
-def to_json(rehearsal: Rehearsal) -> str:
-    """Return rehearsal.json; a number that is not finite is null."""
-    found = {
-        "schema": SCHEMA,
-        "verdict": "GO" if rehearsal.go else "NO-GO",
-        "reasons": rehearsal.reasons,
-        **{
-            field.name: getattr(rehearsal, field.name)
-            for field in dataclasses.fields(rehearsal)
-            if field.name not in ("timing", "prediction", "checks")
-        },
-        "timing": _timing(rehearsal.timing),
-        "prediction": rehearsal.prediction and _prediction(rehearsal.prediction),
-        "checks": [
-            {name: getattr(check, name) for name in _CHECK_FIELDS} for check in rehearsal.checks
-        ],
-    }
-    return pretty(_plain(found)) + "\n"
-
-
-_CHECK_FIELDS = ("name", "passed", "value", "limit", "sentence")
-
-
-def _timing(timing: LoopTiming) -> dict[str, Any]:
-    found = dataclasses.asdict(timing)
-    del found["delay_s"]
-    return found | {"histogram_edges_s": EDGES_S}
-
-
-def _prediction(prediction: Prediction) -> dict[str, Any]:
-    shares = ("margin_share", "worst_bias_db", "worst_bias_deg")
-    found = dataclasses.asdict(prediction)
-    return found | {name: getattr(prediction, name) for name in shares}
-
-
-def _plain(value: Any) -> Any:
-    """Return nested data of JSON's own types."""
-    if isinstance(value, Mapping):
-        return {name: _plain(item) for name, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(item) for item in value]
-    if isinstance(value, np.ndarray):
-        return _plain(value.tolist())
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    return value
+    @computed_field  # type: ignore[prop-decorator]
+    @property
+    def advice(self) -> list[str]:
+        """What to do after a NO-GO, what comes first first."""
+        return advice(self.checks, self.machine)
 
 
 def milliseconds(distribution: Distribution) -> list[float]:

@@ -6,8 +6,10 @@ import math
 
 import numpy as np
 
-from bla_analyzer.result import Check
-from fjr_sim_node.faults import CONTINUES, NODE, SAFE_STATES, FaultPlan
+from fjr_kit.check import Check
+from fjr_sim_node.drive.faults import CONTINUES, NODE, SAFE_STATES, FaultPlan
+
+from .limits import limit_check
 
 
 def onset_ns(plan: FaultPlan, position: np.ndarray, killed_ns: int | None) -> int | None:
@@ -53,13 +55,15 @@ def safe_state(
     limit_s = fault.within_s + ahead_s * (plan.values.get("node") == "excitation")
     what = f"after {fault.identifier}"
     if began_ns is None or ended_ns < began_ns + limit_s * 1e9:
-        return _check(math.inf, limit_s, f"{what}: the run ended before the safe state was due")
+        return limit_check(
+            "safe_state", math.inf, limit_s, f"{what}: the run ended before the safe state was due"
+        )
     after = torque[torque["received"] >= began_ns]
     if fault.safe_state == CONTINUES:
         bad = int((~(np.abs(after["value"]) <= torque_limit_nm)).sum())
         if bad:
             words = f"{what} {bad} torques were not finite or beyond {torque_limit_nm:g} N m"
-            return _check(math.inf, limit_s, words)
+            return limit_check("safe_state", math.inf, limit_s, words)
         asked = min(ended_ns, int(position["sent"][-1]))
         # Behind the last position nobody asks any more: if that one was lost, the watchdog's
         # torques come then, and end no pause.
@@ -67,12 +71,8 @@ def safe_state(
         times = np.concatenate([[began_ns], answers, [max(asked, began_ns)]])
         pause_s = float(np.diff(times).max()) * 1e-9
         words = f"{what} no torque came for {pause_s:.3f} s at most ({SAFE_STATES[CONTINUES]})"
-        return _check(pause_s, limit_s, words)
+        return limit_check("safe_state", pause_s, limit_s, words)
     moving = after["received"][after["value"] != 0.0]
     last_s = float(moving[-1] - began_ns) * 1e-9 if moving.size else 0.0
     words = f"{what} the last torque that was not zero came after {last_s:.3f} s"
-    return _check(last_s, limit_s, words)
-
-
-def _check(value: float, limit: float, words: str) -> Check:
-    return Check("safe_state", None, None, value <= limit, value, limit, f"safe_state: {words}.")
+    return limit_check("safe_state", last_s, limit_s, words)

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from fjr_interface.parameters import Parameter
-from fjr_sim_node.faults import CATALOGUE, Fault
+from fjr_sim_node.drive.faults import CATALOGUE, Fault
 
 from .limits import LIMITS
 

@@ -1,4 +1,4 @@
-"""Timing of a real-time loop from what a passive observer saw: rate, jitter, latency, lost samples.
+"""Timing of a real-time loop, passively observed: rate, jitter, latency, lost samples.
 
 Every message has three times: its stamp (the sample instant), when it was sent and when it was
 received, both by the machine's clock. The delay of the loop has two parts: lateness, from the
@@ -9,10 +9,15 @@ punctual message of the last seconds; a delay that was there all the time is not
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field, computed_field
 from scipy.ndimage import minimum_filter1d
+
+from fjr_kit.result_types import Array, Number, ResultModel, Unit
+
+Seconds = Annotated[Number, Unit("s")]
 
 EDGES_S = np.geomspace(1e-6, 1.0, 121)
 """Edges of all histograms: 20 bins a decade. What lies outside counts in the outermost bins."""
@@ -28,8 +33,7 @@ RECORD = np.dtype([("stamp", "<i8"), ("sent", "<i8"), ("received", "<i8"), ("val
 """What is kept of a message: three times in ns, and its value."""
 
 
-@dataclass(frozen=True)
-class Distribution:
+class Distribution(ResultModel):
     """Distribution of a time in seconds; all NaN if there are no values.
 
     Attributes:
@@ -42,26 +46,25 @@ class Distribution:
     """
 
     count: int
-    p50: float
-    p99: float
-    p999: float
-    worst: float
-    histogram: np.ndarray
+    p50: Seconds
+    p99: Seconds
+    p999: Seconds
+    worst: Seconds
+    histogram: Annotated[np.ndarray, Array("1", int)]
 
     @classmethod
     def of(cls, seconds: np.ndarray) -> Distribution:
         """Return the distribution of values of shape (count,)."""
         if not seconds.size:
-            unknown = float("nan")
-            nothing = np.zeros(EDGES_S.size - 1, int)
-            return cls(0, unknown, unknown, unknown, unknown, nothing)
-        p50, p99, p999 = np.quantile(seconds, [0.5, 0.99, 0.999], method="higher").tolist()
+            p50 = p99 = p999 = worst = float("nan")
+        else:
+            p50, p99, p999 = np.quantile(seconds, [0.5, 0.99, 0.999], method="higher").tolist()
+            worst = seconds.max()
         counts, _ = np.histogram(np.clip(seconds, EDGES_S[0], EDGES_S[-1]), EDGES_S)
-        return cls(seconds.size, p50, p99, p999, float(seconds.max()), counts)
+        return cls(count=seconds.size, p50=p50, p99=p99, p999=p999, worst=worst, histogram=counts)
 
 
-@dataclass(frozen=True)
-class TopicTiming:
+class TopicTiming(ResultModel):
     """What an observer saw of one signal.
 
     Attributes:
@@ -78,19 +81,18 @@ class TopicTiming:
     """
 
     messages: int
-    rate_hz: float
+    rate_hz: Annotated[Number, Unit("Hz")]
     jitter: Distribution
     lost: int
     repeated: int
     unordered: int
     clock_jumps: int
     not_finite: int
-    lost_at_s: float
-    greatest: float
+    lost_at_s: Seconds
+    greatest: Number
 
 
-@dataclass(frozen=True)
-class LoopTiming:
+class LoopTiming(ResultModel):
     """What an observer saw of the loop.
 
     Attributes:
@@ -102,26 +104,32 @@ class LoopTiming:
         lateness: from the sample instant to sending y_k.
         latency: from sending y_k to receiving u_k.
         delay: their sum, of each answered sample.
-        delay_s: the same, float64 (answered samples,).
+        delay_s: the same, float64 (answered samples,); not written.
         late: answers that came later than one sample period.
         unanswered: positions without torque; those of the last 0.1 s are left out.
         late_references: positions sent before their reference was.
         clocks_differ: a message was received before it was sent.
     """
 
-    sample_rate_hz: float
-    duration_s: float
+    sample_rate_hz: Annotated[Number, Unit("Hz")]
+    duration_s: Seconds
     reference: TopicTiming
     position: TopicTiming
     torque: TopicTiming
     lateness: Distribution
     latency: Distribution
     delay: Distribution
-    delay_s: np.ndarray
+    delay_s: Annotated[np.ndarray, Array("s")] = Field(exclude=True)
     late: int
     unanswered: int
     late_references: int
     clocks_differ: bool
+
+    @computed_field  # type: ignore[prop-decorator]
+    @property
+    def histogram_edges_s(self) -> Annotated[np.ndarray, Array("s")]:
+        """Edges of all histograms."""
+        return EDGES_S
 
 
 def loop_timing(

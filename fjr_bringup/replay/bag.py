@@ -1,4 +1,4 @@
-"""What the nodes that stand in for others read of a bag, and what they share."""
+"""The bag as read by replay nodes, which stand in for the rig's own, and the parts they share."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import struct
 from dataclasses import dataclass
 from pathlib import Path
 
-from fjr_interface.bag_reader import BagReader, Record, find_bags, read_record
-from fjr_interface.errors import InputError
-from fjr_interface.experiment import Experiment
+from fjr_interface.bags.reader import BagReader, Record, find_bags, read_record
+from fjr_interface.experiment import Experiment, periodic
 from fjr_interface.parameters import Parameter
+from fjr_kit.errors import InputError
 
 BAG_PARAMETER = Parameter("bag", "", "", "Folder of the bag to replay")
 
@@ -45,7 +45,7 @@ def read_description(bag: str) -> Experiment:
             f"{bag}: describes no experiment, so the nodes cannot replay it in lockstep; leave "
             "--into out to publish it as it is."
         )
-    return experiment
+    return periodic(experiment, bag)
 
 
 def read_recorded(bag: str) -> Recorded:

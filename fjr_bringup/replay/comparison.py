@@ -1,35 +1,28 @@
-"""Recorded and replayed signals, sample by sample: a table, and `replay.json`."""
+"""Recorded and replayed signals, sample by sample, and `replay.json`."""
 
 from __future__ import annotations
 
-import json
 import math
-import os
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Literal
 
 import numpy as np
-from rich.box import SIMPLE_HEAD
-from rich.console import Console
-from rich.table import Table
+from pydantic import Field, computed_field
 
-from fjr_interface.bag_reader import BagReader
-from fjr_interface.errors import InputError
+from fjr_interface.bags.reader import BagReader
 from fjr_interface.topics import MOTOR_POSITION, MOTOR_TORQUE, REFERENCE
+from fjr_kit.atomic import write_whole
+from fjr_kit.result_types import Document, FreeForm, Number, ResultModel, Unit
 
-from .plan import PLAYED_ANEW, ReplayPlan
+from .lockstep_plan import PLAYED_ANEW, ReplayPlan
 
-SCHEMA = "fjr_rig/replay/1"
 REPLAY_FILE = "replay.json"
 
 _SIGNALS = {"reference": REFERENCE, "position": MOTOR_POSITION, "torque": MOTOR_TORQUE}
 _BLOCK = 2**16
 
 
-@dataclass(frozen=True)
-class Difference:
+class Difference(ResultModel):
     """Replayed minus recorded samples of one signal; samples count from 1, values in `unit`.
 
     Attributes:
@@ -51,13 +44,14 @@ class Difference:
     samples: int = 0
     different: int = 0
     first_different: int | None = None
-    rms_recorded: float = 0.0
-    mean: float = 0.0
-    rms: float = 0.0
-    worst: float = 0.0
+    rms_recorded: Number = 0.0
+    mean: Number = 0.0
+    rms: Number = 0.0
+    worst: Number = 0.0
     worst_sample: int | None = None
-    worst_s: float | None = None
+    worst_s: Annotated[float | None, Unit("s")] = None
 
+    @computed_field  # type: ignore[prop-decorator]
     @property
     def identical(self) -> bool:
         """Whether every sample has the same bits."""
@@ -73,21 +67,19 @@ class Difference:
         if first is None and bits.size:
             first = self.samples + int(bits[0]) + 1
         at = int(np.abs(error).argmax())
-        taken = replace(
-            self,
-            samples=total,
-            different=self.different + bits.size,
-            first_different=first,
-            rms_recorded=_rms(self.rms_recorded, self.samples, before),
-            mean=(self.mean * self.samples + float(error.sum())) / total,
-            rms=_rms(self.rms, self.samples, error),
-        )
-        if abs(error[at]) <= self.worst:
-            return taken
+        found = {
+            "samples": total,
+            "different": self.different + bits.size,
+            "first_different": first,
+            "rms_recorded": _rms(self.rms_recorded, self.samples, before),
+            "mean": (self.mean * self.samples + float(error.sum())) / total,
+            "rms": _rms(self.rms, self.samples, error),
+        }
         worst = float(abs(error[at]))
-        return replace(
-            taken, worst=worst, worst_sample=self.samples + at + 1, worst_s=float(stamps[at]) * 1e-9
-        )
+        if not worst <= self.worst:
+            found |= {"worst": worst, "worst_sample": self.samples + at + 1}
+            found["worst_s"] = float(stamps[at]) * 1e-9
+        return self.model_copy(update=found)
 
 
 def _rms(before: float, samples: int, more: np.ndarray) -> float:
@@ -103,7 +95,7 @@ def compare(recorded: Path, replayed: Path, into: str) -> dict[str, Difference]:
         InputError: a bag is not whole.
     """
     found = {
-        name: Difference(signal.unit, name in PLAYED_ANEW[into])
+        name: Difference(unit=signal.unit, played_anew=name in PLAYED_ANEW[into])
         for name, signal in _SIGNALS.items()
     }
     readers = (BagReader(recorded).blocks(_BLOCK), BagReader(replayed).blocks(_BLOCK))
@@ -114,6 +106,35 @@ def compare(recorded: Path, replayed: Path, into: str) -> dict[str, Difference]:
     return found
 
 
+class ReplayResult(Document):
+    """What a replay found.
+
+    Attributes:
+        bag: the bag that was replayed.
+        into: `closed-loop`, `plant` or `controller`.
+        rig: parameter file of the simulated rig, or `paper`; None where no plant was simulated.
+        replayed_bag: the bag that was recorded; None if it was not kept.
+        sample_rate_hz: rate of the samples.
+        signals: differences of reference, position and torque.
+        parameters: of the nodes that took part, by node.
+    """
+
+    schema_name: Literal["fjr_rig/replay/1"] = Field("fjr_rig/replay/1", alias="schema")
+    bag: str
+    into: str
+    rig: str | None
+    replayed_bag: str | None
+    sample_rate_hz: Annotated[Number, Unit("Hz")]
+    signals: dict[str, Difference]
+    parameters: FreeForm
+
+    @computed_field  # type: ignore[prop-decorator]
+    @property
+    def identical(self) -> bool:
+        """Whether all signals that were played anew have the recorded bits."""
+        return all(each.identical for each in self.signals.values() if each.played_anew)
+
+
 def report(plan: ReplayPlan, differences: dict[str, Difference], kept: Path | None) -> str:
     """Return the text of replay.json.
 
@@ -122,58 +143,19 @@ def report(plan: ReplayPlan, differences: dict[str, Difference], kept: Path | No
         differences: by signal.
         kept: the bag that was recorded; None if it was not kept.
     """
-    anew = [each for each in differences.values() if each.played_anew]
-    document: dict[str, Any] = {
-        "schema": SCHEMA,
-        "bag": str(plan.bag),
-        "into": plan.into,
-        "rig": plan.rig,
-        "replayed_bag": None if kept is None else str(kept),
-        "sample_rate_hz": plan.experiment.sample_rate_hz,
-        "identical": all(each.identical for each in anew),
-        "signals": {
-            name: {**asdict(each), "identical": each.identical}
-            for name, each in differences.items()
-        },
-        "parameters": plan.values,
-    }
-    return json.dumps(_finite(document), indent=2, allow_nan=False) + "\n"
-
-
-def _finite(value: Any) -> Any:
-    """Return infinite numbers (no limit, no noise) as null, as JSON has none."""
-    if isinstance(value, dict):
-        return {key: _finite(each) for key, each in value.items()}
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
+    return ReplayResult(
+        bag=str(plan.bag),
+        into=plan.into,
+        rig=plan.rig,
+        replayed_bag=None if kept is None else str(kept),
+        sample_rate_hz=plan.experiment.sample_rate_hz,
+        signals=differences,
+        parameters=plan.values,
+    ).to_json()
 
 
 def write_report(folder: Path, text: str) -> Path:
     """Write replay.json, as a whole or not at all; return its path."""
     path = folder / REPLAY_FILE
-    temporary = folder / f".{REPLAY_FILE}.{os.getpid()}.tmp"
-    try:
-        temporary.write_text(text, encoding="utf-8")
-        temporary.replace(path)
-    except OSError as error:
-        temporary.unlink(missing_ok=True)
-        raise InputError(f"{path}: cannot be written: {error.strerror}.") from None
+    write_whole(path, text)
     return path
-
-
-def print_table(differences: dict[str, Difference], console: Console) -> None:
-    """Print one line for each signal that was played anew, or that should not differ but does."""
-    table = Table("signal", "identical", box=SIMPLE_HEAD)
-    for title in ("rms", "rms diff.", "worst diff.", "unit", "at sample"):
-        table.add_column(title, justify="left" if title == "unit" else "right", no_wrap=True)
-    for name, each in differences.items():
-        if each.played_anew or each.different:
-            table.add_row(name, *_cells(each))
-    console.print(table)
-
-
-def _cells(each: Difference) -> Sequence[str]:
-    numbers = [f"{value:.4g}" for value in (each.rms_recorded, each.rms, each.worst)]
-    where = "" if each.worst_sample is None else str(each.worst_sample)
-    return ("yes" if each.identical else "no", *numbers, each.unit, where)

@@ -9,17 +9,21 @@ import sys
 
 from sensor_msgs.msg import JointState
 
-from fjr_interface import ros, topics
-from fjr_interface.errors import InputError
-from fjr_interface.joint_state import JointStateReader, JointStateWriter, LayoutError
+from fjr_interface import topics
+from fjr_interface.bags.joint_state import JointStateReader, JointStateWriter, LayoutError
 from fjr_interface.parameters import ParameterGroup
+from fjr_interface.ros import runtime, spinning
+from fjr_interface.ros.program import Program
+from fjr_kit.errors import InputError
 
 from .bag import BAG_PARAMETER, read_recorded
 
-PARAMETERS = ParameterGroup(BAG_PARAMETER, ros.JOINT_PARAMETER, ros.readers_parameter("simulator"))
+PARAMETERS = ParameterGroup(
+    BAG_PARAMETER, runtime.JOINT_PARAMETER, runtime.readers_parameter("simulator")
+)
 
 
-class ReplayControllerNode(ros.RigNode):
+class ReplayControllerNode(runtime.RigNode):
     """A controller in an open loop: its torque is a bag's, whatever the position.
 
     A position with the stamp of the first sample starts the replay.
@@ -34,9 +38,11 @@ class ReplayControllerNode(ros.RigNode):
         self._stamps = record.stamps_ns.tolist()
         self._decode = JointStateReader("position").decode
         self._sample = 0
-        self._torque = self.create_publisher(JointState, topics.MOTOR_TORQUE.topic, ros.SIGNAL_QOS)
+        self._torque = self.create_publisher(
+            JointState, topics.MOTOR_TORQUE.topic, runtime.SIGNAL_QOS
+        )
         self.create_subscription(
-            JointState, topics.MOTOR_POSITION.topic, self._on_position, ros.SIGNAL_QOS, raw=True
+            JointState, topics.MOTOR_POSITION.topic, self._on_position, runtime.SIGNAL_QOS, raw=True
         )
 
     def _on_position(self, message: bytes) -> None:
@@ -64,7 +70,8 @@ class ReplayControllerNode(ros.RigNode):
 
 def main() -> int:
     """Run the node."""
-    return ros.run(ReplayControllerNode)
+    program = Program("fjr_bringup.replay.controller", ReplayControllerNode.__doc__, PARAMETERS)
+    return spinning.run(ReplayControllerNode, program=program)
 
 
 if __name__ == "__main__":

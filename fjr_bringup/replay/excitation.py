@@ -11,9 +11,10 @@ from functools import cached_property
 import numpy as np
 
 from excitation_node.node import STREAM, ExcitationNode
-from fjr_interface import ros
 from fjr_interface.experiment import Experiment
 from fjr_interface.parameters import ParameterGroup
+from fjr_interface.ros import spinning
+from fjr_interface.ros.program import Program
 
 from .bag import BAG_PARAMETER, Recorded, read_recorded
 
@@ -49,7 +50,8 @@ class ReplayExcitationNode(ExcitationNode):
 
 def main() -> int:
     """Run the node."""
-    return ros.run(ReplayExcitationNode)
+    program = Program("fjr_bringup.replay.excitation", ReplayExcitationNode.__doc__, PARAMETERS)
+    return spinning.run(ReplayExcitationNode, program=program)
 
 
 if __name__ == "__main__":

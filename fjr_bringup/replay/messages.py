@@ -7,26 +7,28 @@ of these, it is the time at which the message was recorded.
 
 from __future__ import annotations
 
-import contextlib
 import importlib
+import itertools
 import struct
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
-from rosbags.interfaces import Connection, Qos, QosTime
-from rosbags.rosbag2 import Reader
+from rosbags.interfaces import Qos, QosTime
+from rosbags.rosbag2.metadata import parse_qos
 from std_msgs.msg import String
 
-from fjr_interface import ros
-from fjr_interface.bag_metadata import read_metadata, storage_files
-from fjr_interface.errors import InputError
+from fjr_interface.bags.blocks import MEND, Block
+from fjr_interface.bags.files import bag_files
+from fjr_interface.bags.metadata import TopicMetadata
+from fjr_interface.bags.plain_yaml import load_plain_yaml
 from fjr_interface.experiment import CUSTOM_DATA_KEY
-from fjr_interface.mcap_blocks import MEND
+from fjr_interface.ros import runtime
 from fjr_interface.topics import (
     EXPERIMENT_TOPIC,
     LINK_POSITION,
@@ -35,6 +37,7 @@ from fjr_interface.topics import (
     NAMESPACE,
     REFERENCE,
 )
+from fjr_kit.errors import InputError
 
 CLOCK = "/clock"
 
@@ -79,7 +82,7 @@ class TimedMessage:
 
 
 class Messages:
-    """The messages of a bag to publish; a context manager, iterated again and again.
+    """The messages of a bag to publish, iterated again and again.
 
     Attributes:
         topics: what is published.
@@ -98,19 +101,18 @@ class Messages:
             InputError: the bag cannot be read, or holds no such topic.
         """
         self._bag = bag
-        self.notes: list[str] = []
-        metadata = read_metadata(bag)
-        storage_files(bag, metadata)
-        self._reader = Reader(bag)
-        with self._readable():
-            self._reader.open()
-        self.duration_s = max(self._reader.duration, 0) * 1e-9
+        self._files = bag_files(bag)
+        self._files.refuse_cut()
+        self.notes = list(self._files.notes)
+        self.duration_s = max(self._files.duration_ns, 0) * 1e-9
         self._played: dict[str, PlayedTopic] = {}
-        self._connections = [each for each in self._chosen(wanted) if self._can_play(each)]
+        for each in self._chosen(wanted):
+            self._take_in(each)
         if not self._played:
-            self.close()
             raise InputError(f"{bag}: holds no message that can be published here.")
-        self._description = self._described((metadata.custom_data or {}).get(CUSTOM_DATA_KEY))
+        metadata = self._files.metadata
+        custom = {} if metadata is None else metadata.custom_data or {}
+        self._description = self._described(custom.get(CUSTOM_DATA_KEY))
         self._keeper = self._clock_keeper()
 
     @property
@@ -118,57 +120,47 @@ class Messages:
         """What is published."""
         return list(self._played.values())
 
-    def close(self) -> None:
-        """Close the bag."""
-        self._reader.close()
-
-    def __enter__(self) -> Messages:
-        """Return itself."""
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Close the bag."""
-        self.close()
-
-    @contextlib.contextmanager
-    def _readable(self) -> Iterator[None]:
-        try:
-            yield
-        except Exception:  # rosbags unpacks arbitrary bytes here: anything may go wrong
-            raise InputError(f"{self._bag}: is damaged and cannot be played; {MEND}.") from None
-
-    def _chosen(self, wanted: Sequence[str]) -> list[Connection]:
-        there = self._reader.connections
+    def _chosen(self, wanted: Sequence[str]) -> list[TopicMetadata]:
+        there = self._files.described
         for name in wanted:
-            if not any(_means(name, each.topic) for each in there):
-                names = ", ".join(sorted({each.topic for each in there}))
+            if not any(_means(name, each.name) for each in there):
+                names = ", ".join(sorted({each.name for each in there}))
                 raise InputError(f"{self._bag}: holds no topic {name}; there are: {names}.")
         return [
             each
             for each in there
             if not wanted
-            or _means(EXPERIMENT_TOPIC, each.topic)
-            or any(_means(name, each.topic) for name in wanted)
+            or _means(EXPERIMENT_TOPIC, each.name)
+            or any(_means(name, each.name) for name in wanted)
         ]
 
-    def _can_play(self, connection: Connection) -> bool:
-        """Take a connection's topic in, or note why it is left out."""
-        if connection.topic in self._played:
-            return True
-        kind = _message_class(connection.msgtype)
-        encoding = getattr(connection.ext, "serialization_format", "cdr")
+    def _take_in(self, topic: TopicMetadata) -> None:
+        """Take a topic in, or note why it is left out."""
+        if topic.name in self._played:
+            return
+        kind = _message_class(topic.type)
+        encoding = topic.serialization_format
         if kind is None or encoding != "cdr":
-            why = f"the type {connection.msgtype} is not installed" if kind is None else encoding
-            self.notes.append(f"{connection.topic} is left out: {why}.")
-            return False
+            why = f"the type {topic.type} is not installed" if kind is None else encoding
+            self.notes.append(f"{topic.name} is left out: {why}.")
+            return
         offers = [
             qos
-            for each in self._reader.connections
-            if each.topic == connection.topic
-            for qos in getattr(each.ext, "offered_qos_profiles", ())
+            for each in self._files.described
+            if each.name == topic.name
+            for qos in self._offered(each)
         ]
-        self._played[connection.topic] = PlayedTopic(connection.topic, kind, to_offer(offers))
-        return True
+        self._played[topic.name] = PlayedTopic(topic.name, kind, to_offer(offers))
+
+    def _offered(self, topic: TopicMetadata) -> list[Qos]:
+        profiles = topic.offered_qos_profiles
+        try:
+            given: Any = load_plain_yaml(profiles) if isinstance(profiles, str) else profiles
+            return parse_qos(given)
+        except Exception:  # rosbags trusts what it finds here: anything may go wrong
+            raise InputError(
+                f"{self._bag}: {topic.name}: offered_qos_profiles is damaged; {MEND}."
+            ) from None
 
     def _described(self, text: object) -> TimedMessage | None:
         """Return the description of metadata.yaml if no message gives one."""
@@ -176,7 +168,7 @@ class Messages:
             _means(EXPERIMENT_TOPIC, name) for name in self._played
         ):
             return None
-        topic = PlayedTopic(f"{NAMESPACE}/{EXPERIMENT_TOPIC}", String, ros.EXPERIMENT_QOS)
+        topic = PlayedTopic(f"{NAMESPACE}/{EXPERIMENT_TOPIC}", String, runtime.EXPERIMENT_QOS)
         self._played[topic.name] = topic
         return TimedMessage(topic, serialize_message(String(data=text)), 0, -1, 0.0)
 
@@ -192,11 +184,14 @@ class Messages:
         """Yield all messages in the order of recording."""
         if self._description is not None:
             yield self._description
-        begin_ns = now_ns = None
-        for connection, logged_ns, data in self._logged():
+        begin_ns = now_ns = begun_ns = None
+        for name, logged_ns, data in self._logged():
+            begun_ns = logged_ns if begun_ns is None else begun_ns
             if self._keeper is None:
                 stamp_ns = logged_ns
-            elif connection.topic == self._keeper:
+            elif name == self._keeper:
+                if len(data) < _STAMP.size:
+                    raise InputError(f"{self._bag}: {name}: a message has no stamp; {MEND}.")
                 seconds, nanoseconds = _STAMP.unpack_from(data)
                 stamp_ns = seconds * 1_000_000_000 + nanoseconds
             else:
@@ -205,18 +200,27 @@ class Messages:
             if begin_ns is None and now_ns >= 0:
                 begin_ns = now_ns
             offset_ns = 0 if begin_ns is None else now_ns - begin_ns
-            logged_s = (logged_ns - self._reader.start_time) * 1e-9
-            topic = self._played[connection.topic]
-            yield TimedMessage(topic, data, offset_ns, now_ns, logged_s)
+            logged_s = (logged_ns - begun_ns) * 1e-9
+            yield TimedMessage(self._played[name], data, offset_ns, now_ns, logged_s)
 
-    def _logged(self) -> Iterator[tuple[Connection, int, bytes]]:
-        messages = self._reader.messages(self._connections) if self._connections else iter(())
-        while True:
-            with self._readable():
-                message = next(messages, None)
-            if message is None:
-                return
-            yield message
+    def _logged(self) -> Iterator[tuple[str, int, bytes]]:
+        """Yield (topic, time of recording in ns, payload)."""
+        blocks = (
+            block for block in self._files.blocks(self._played) if block.topic.name in self._played
+        )
+        for _, group in itertools.groupby(blocks, key=lambda block: id(block.data)):
+            yield from _in_order(list(group))
+
+
+def _in_order(blocks: list[Block]) -> Iterator[tuple[str, int, bytes]]:
+    """Yield the messages of blocks that were recorded together, by time of recording."""
+    times = np.concatenate([block.times for block in blocks])
+    starts = np.concatenate([block.starts for block in blocks])
+    which = np.repeat(np.arange(len(blocks)), [len(block.starts) for block in blocks])
+    first = np.cumsum([0, *(len(block.starts) for block in blocks)])
+    for at in np.lexsort((starts, times)):
+        block = blocks[which[at]]
+        yield block.topic.name, int(times[at]), block.payload(at - first[which[at]])
 
 
 def to_offer(recorded: Sequence[Qos]) -> QoSProfile:

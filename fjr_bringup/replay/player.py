@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import math
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import rclpy
@@ -15,17 +16,16 @@ from rclpy.qos import ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 from rosgraph_msgs.msg import Clock
 
-from fjr_interface import ros
-from fjr_interface.errors import InputError
+from fjr_interface.ros import runtime
 from fjr_interface.topics import NAMESPACE
+from fjr_kit.errors import InputError
+from fjr_kit.stopping import Interruption
 
-from ..domain import own_domain, reach
-from ..interruption import Interruption
-from ..progress import CampaignProgress
+from ..campaign.progress import CampaignProgress
+from ..graph.domain import own_domain, reach
 from .bag import clock_message
 from .messages import CLOCK, Messages, PlayedTopic
-from .options import Publishing
-from .summary import PlayedLine, print_summary
+from .publishing import Published, PublishedTopic, Publishing
 
 NODE = "replay"
 
@@ -37,31 +37,34 @@ _LAST_S = 4.0  # at the end, for what DDS must repeat: by default every 3 s
 _BURST = 50  # messages on one topic between two acknowledgements
 
 
-def publish_bag(bag: Path, publishing: Publishing) -> None:
-    """Publish a bag and print a summary.
+def publish_bag(bag: Path, publishing: Publishing, sum_up: Callable[[Published], None]) -> None:
+    """Publish a bag.
+
+    Args:
+        bag: its folder.
+        publishing: what of it, and how.
+        sum_up: told at the end, and at Ctrl-C, what was published.
 
     Raises:
         InputError: the bag cannot be read, a topic is not in it, or somebody else publishes one.
         KeyboardInterrupt: Ctrl-C; what was published until then was summed up.
     """
     own_domain()  # refused by a sentence, unlike by rclpy
-    with Messages(bag, publishing.topics) as messages, Interruption() as interruption:
+    messages = Messages(bag, publishing.topics)
+    with Interruption() as interruption:
         rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
         try:
             node = rclpy.create_node(NODE, namespace=NAMESPACE, start_parameter_services=False)
-            _publish(Player(node, messages, publishing, interruption))
+            player = Player(node, messages, publishing, interruption)
+            player.wait()
+            try:
+                player.play()
+            except KeyboardInterrupt:
+                sum_up(player.published)
+                raise
+            sum_up(player.published)
         finally:
             rclpy.try_shutdown()
-
-
-def _publish(player: Player) -> None:
-    player.wait()
-    try:
-        player.play()
-    except KeyboardInterrupt:
-        player.sum_up()
-        raise
-    player.sum_up()
 
 
 class _Output:
@@ -103,10 +106,11 @@ class _Output:
     def readers(self) -> int:
         return int(self._publisher.get_subscription_count())
 
-    def line(self) -> PlayedLine:
+    @property
+    def published(self) -> PublishedTopic:
         reliability = "reliable" if self._reliable else "best effort"
         qos = f"{reliability}, latched" if self.topic.latched else reliability
-        return PlayedLine(self.topic.name, self.messages, qos, self.readers)
+        return PublishedTopic(self.topic.name, self.messages, qos, self.readers)
 
 
 class Player:
@@ -123,7 +127,7 @@ class Player:
         self._outputs = {topic.name: _Output(node, topic, paced) for topic in messages.topics}
         self._ticks: _Output | None = None
         if CLOCK not in self._outputs:
-            self._ticks = _Output(node, PlayedTopic(CLOCK, Clock, ros.CLOCK_QOS), False)
+            self._ticks = _Output(node, PlayedTopic(CLOCK, Clock, runtime.CLOCK_QOS), False)
             self._outputs[CLOCK] = self._ticks
         self._begun_s = self._took_s = self._late_s = 0.0
         self._played_ns = 0
@@ -231,10 +235,11 @@ class Player:
         time.sleep(seconds)
         self._interruption.raise_if_asked()
 
-    def sum_up(self) -> None:
-        """Print what was published."""
-        print_summary(
-            [output.line() for output in self._outputs.values()],
+    @property
+    def published(self) -> Published:
+        """What was published until now."""
+        return Published(
+            tuple(output.published for output in self._outputs.values()),
             self._played_ns * 1e-9,
             self._took_s,
             None if math.isinf(self._publishing.rate) else self._late_s,

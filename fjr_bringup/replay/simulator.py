@@ -11,18 +11,23 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
-from fjr_interface import ros, topics
-from fjr_interface.errors import InputError
+from fjr_interface import topics
+from fjr_interface.bags.joint_state import JointStateReader, JointStateWriter, LayoutError
 from fjr_interface.experiment import Experiment
-from fjr_interface.joint_state import JointStateReader, JointStateWriter, LayoutError
 from fjr_interface.parameters import ParameterGroup
+from fjr_interface.ros import runtime, spinning
+from fjr_interface.ros.program import Program
+from fjr_interface.waiting import Lack
+from fjr_kit.errors import InputError
 
 from .bag import BAG_PARAMETER, clock_message, read_recorded
 
-PARAMETERS = ParameterGroup(BAG_PARAMETER, ros.JOINT_PARAMETER, ros.readers_parameter("controller"))
+PARAMETERS = ParameterGroup(
+    BAG_PARAMETER, runtime.JOINT_PARAMETER, runtime.readers_parameter("controller")
+)
 
 
-class ReplaySimulatorNode(ros.RigNode):
+class ReplaySimulatorNode(runtime.RigNode):
     """A drive whose positions are a bag's, whatever the torque.
 
     Each experiment description starts the replay; each torque of the sample's stamp is answered
@@ -38,15 +43,15 @@ class ReplaySimulatorNode(ros.RigNode):
         self._stamps = record.stamps_ns.tolist()
         self._decode = JointStateReader("effort").decode
         self._sample = len(self._stamps)
-        self._ticks = self.create_publisher(Clock, "/clock", ros.CLOCK_QOS)
+        self._ticks = self.create_publisher(Clock, "/clock", runtime.CLOCK_QOS)
         self._position = self.create_publisher(
-            JointState, topics.MOTOR_POSITION.topic, ros.SIGNAL_QOS
+            JointState, topics.MOTOR_POSITION.topic, runtime.SIGNAL_QOS
         )
         self._torque = self.create_subscription(
-            JointState, topics.MOTOR_TORQUE.topic, self._on_torque, ros.SIGNAL_QOS, raw=True
+            JointState, topics.MOTOR_TORQUE.topic, self._on_torque, runtime.SIGNAL_QOS, raw=True
         )
         self.create_subscription(
-            String, topics.EXPERIMENT_TOPIC, self._on_experiment, ros.EXPERIMENT_QOS
+            String, topics.EXPERIMENT_TOPIC, self._on_experiment, runtime.EXPERIMENT_QOS
         )
 
     def _on_experiment(self, message: String) -> None:
@@ -58,8 +63,8 @@ class ReplaySimulatorNode(ros.RigNode):
         self._sample = 0
         self.wait_until(self._lacking, self._publish_sample)
 
-    def _lacking(self) -> str | None:
-        return self.unread(self._position) or self.unwritten(self._torque)
+    def _lacking(self) -> Lack | None:
+        return self.unread(self._position) or self.unwritten(self._torque, "controller")
 
     def _publish_sample(self) -> None:
         self._position.publish(self._messages[self._sample].tobytes())
@@ -79,15 +84,16 @@ class ReplaySimulatorNode(ros.RigNode):
     def _due_ns(self) -> int | None:
         return self._stamps[self._sample] if self._sample < len(self._stamps) else None
 
-    def owed(self) -> str | None:
+    def owed(self) -> Lack | None:
         """Return the torque that the replay waits for."""
         due = self._due_ns()
-        return None if due is None else f"the torque of {due * 1e-9:.6f} s"
+        return None if due is None else Lack(f"the torque of {due * 1e-9:.6f} s")
 
 
 def main() -> int:
     """Run the node."""
-    return ros.run(ReplaySimulatorNode)
+    program = Program("fjr_bringup.replay.simulator", ReplaySimulatorNode.__doc__, PARAMETERS)
+    return spinning.run(ReplaySimulatorNode, program=program)
 
 
 if __name__ == "__main__":

@@ -10,5 +10,5 @@ setup(
     ],
     install_requires=["setuptools"],
     extras_require={"test": ["pytest"]},
-    entry_points={"console_scripts": ["excitation_node = excitation_node.node:main"]},
+    entry_points={"console_scripts": ["excitation_node = excitation_node.__main__:main"]},
 )

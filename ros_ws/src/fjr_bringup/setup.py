@@ -6,6 +6,7 @@ setup(
     name="fjr_bringup",
     version="0.1.0",
     packages=find_packages(include=["fjr_bringup*"]),
+    package_data={"": ["*.css", "*.html", "*.js", "*.xml"]},
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/fjr_bringup"]),
         ("share/fjr_bringup", ["package.xml"]),
@@ -13,8 +14,6 @@ setup(
         ("share/fjr_bringup/config", glob("config/*.*")),
         ("share/fjr_bringup/config/paper", glob("config/paper/*.yaml")),
     ],
-    # What package.xml cannot name, for rosdep has no key for it.
-    install_requires=["setuptools", "dask>=2024.8", "distributed>=2024.8"],
+    install_requires=["setuptools"],
     extras_require={"test": ["pytest"]},
-    entry_points={"console_scripts": ["fjr = fjr_bringup.cli:main"]},
 )

@@ -4,7 +4,7 @@ setup(
     name="fjr_interface",
     version="0.1.0",
     packages=find_packages(include=["fjr_interface*"]),
-    package_data={"fjr_interface": ["*.xml"]},
+    package_data={"": ["*.css", "*.html", "*.js", "*.xml"]},
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/fjr_interface"]),
         ("share/fjr_interface", ["package.xml"]),

@@ -10,5 +10,5 @@ setup(
     ],
     install_requires=["setuptools"],
     extras_require={"test": ["pytest"]},
-    entry_points={"console_scripts": ["fjr_sim_node = fjr_sim_node.node:main"]},
+    entry_points={"console_scripts": ["fjr_sim_node = fjr_sim_node.__main__:main"]},
 )

@@ -1,0 +1,1 @@
+"""Estimators of the BLA: robust, fast, local polynomial."""

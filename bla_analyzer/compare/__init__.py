@@ -1,0 +1,1 @@
+"""A BLA beside reference models: distance V, resonances, the best amplitude, intervals."""

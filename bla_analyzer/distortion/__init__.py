@@ -1,0 +1,1 @@
+"""Levels of signal, distortion and noise at excited, odd and even lines."""

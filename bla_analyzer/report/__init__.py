@@ -1,0 +1,1 @@
+"""The report of an analysis: figures and one HTML page that opens offline."""

@@ -1,0 +1,1 @@
+"""Campaigns: levels and realizations of one experiment, run in batch, kept in a folder of bags."""

@@ -1,0 +1,1 @@
+"""Design of experiments: best amplitude, spectrum shaping, planning."""

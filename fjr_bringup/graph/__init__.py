@@ -1,0 +1,1 @@
+"""The ROS graph as processes: started, conducted, recorded, talked to by hand."""

@@ -1,0 +1,57 @@
+"""The `fjr` command: a module for each command, named like it, all by one pattern.
+
+A module holds the options of its command and a thin body, which imports what it needs when it is
+called, so that `fjr --help` is quick, and prints what came of it. Errors become one sentence by
+`cli_errors`. Options that several commands have stand in `campaign_options`, `record_options`,
+`search_options` and `worker_options`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import typer
+
+from .amplitude import amplitude
+from .analyze import analyze
+from .blind import blind
+from .bridge import bridge
+from .by_hand import estop, pause, play, reset, speed, status, step, stop
+from .demo import demo
+from .diagnose import diagnose
+from .import_records import import_records
+from .output_pipe import outlive_readers
+from .paper import paper
+from .plan import plan
+from .rehearse import rehearse
+from .replay import replay
+from .run import run
+from .shape import shape
+from .simulate import simulate
+
+Command = Callable[..., None]
+COMMANDS: tuple[Command, ...] = (
+    *(run, simulate, demo, rehearse, amplitude, shape, plan),
+    *(paper, diagnose, bridge, replay),
+)
+BY_HAND: tuple[Command, ...] = (status, pause, play, step, reset, speed, stop, estop)
+
+app = typer.Typer(
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    help="Run, rehearse and analyze identification experiments on a flexible-joint rig.",
+)
+app.command()(analyze)
+app.command("import")(import_records)
+for command in COMMANDS:
+    app.command()(command)
+for command in BY_HAND:
+    app.command(rich_help_panel="A rig started by hand")(command)
+app.add_typer(blind, name="blind")
+
+
+def main() -> None:
+    """Run the command line."""
+    outlive_readers()
+    app(prog_name="fjr")

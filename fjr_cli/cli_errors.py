@@ -1,0 +1,111 @@
+"""What every command of `fjr` does when something goes wrong: one sentence and an exit status."""
+
+from __future__ import annotations
+
+import errno
+import functools
+import os
+import signal
+import tempfile
+import threading
+import traceback
+from collections.abc import Callable, Iterator
+from concurrent.futures import BrokenExecutor
+from contextlib import contextmanager
+from typing import Any, NoReturn, TypeVar
+
+import typer
+
+from fjr_kit.errors import InputError
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+BAD_INPUT, FAILURE, INTERRUPTED = 2, 1, 130
+
+_LONGEST = 200
+"""Characters of an unexpected error that its sentence shows."""
+_NO_THREAD = "can't start new thread"
+
+
+def reports_errors(kept: str) -> Callable[[Command], Command]:
+    """Decorate a command so that no traceback reaches the user.
+
+    Bad input exits with 2, Ctrl-C, SIGTERM and a terminal that is closed with 130, an error of ours
+    with 1; its traceback goes to a file, or to the terminal if FJR_DEBUG=1.
+
+    Args:
+        kept: what Ctrl-C leaves behind, as in 'nothing was written'.
+    """
+
+    def decorate(command: Command) -> Command:
+        @functools.wraps(command)
+        def reporting(*args: Any, **options: Any) -> Any:
+            try:
+                with _ended_as_by_ctrl_c():
+                    return command(*args, **options)
+            except typer.Exit:
+                raise
+            except InputError as error:
+                leave(str(error), BAD_INPUT)
+            except KeyboardInterrupt:
+                leave(f"Interrupted: {kept}.", INTERRUPTED)
+            except Exception as error:
+                if os.environ.get("FJR_DEBUG") == "1":
+                    raise
+                leave(_out_of_memory(error) or _report(error), FAILURE)
+
+        return reporting  # type: ignore[return-value]
+
+    return decorate
+
+
+@contextmanager
+def _ended_as_by_ctrl_c() -> Iterator[None]:
+    """Let SIGTERM and SIGHUP raise KeyboardInterrupt, so that what is half made is cleared away.
+
+    What ignores a signal, as nohup does SIGHUP, goes on ignoring it.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    taken = [n for n in (signal.SIGTERM, signal.SIGHUP) if signal.getsignal(n) == signal.SIG_DFL]
+    for number in taken:
+        signal.signal(number, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        for number in taken:
+            signal.signal(number, signal.SIG_DFL)
+
+
+def leave(sentence: str, status: int) -> NoReturn:
+    """End the command with a sentence on stderr and an exit status."""
+    typer.echo(sentence, err=True)
+    raise typer.Exit(status) from None
+
+
+def _out_of_memory(error: BaseException) -> str | None:
+    """Return the sentence for an error that low memory has caused, else None.
+
+    Whatever was under way, such as a compilation, wraps the error in its own words.
+    """
+    cause: BaseException | None = error
+    while cause is not None:
+        low = isinstance(cause, OSError) and cause.errno == errno.ENOMEM
+        if isinstance(cause, (MemoryError, BrokenExecutor)) or low or _NO_THREAD in str(cause):
+            return (
+                "The memory is not enough, or a process of fjr was killed for it; free some, or "
+                "give fewer --workers, realizations or samples."
+            )
+        cause = cause.__cause__ or cause.__context__
+    return None
+
+
+def _report(error: Exception) -> str:
+    """Write the traceback to a file; return the sentence that says where."""
+    handle, path = tempfile.mkstemp(prefix="fjr-", suffix=".log", text=True)
+    with os.fdopen(handle, "w", encoding="utf-8") as log:
+        traceback.print_exception(error, file=log)
+    text = " ".join(str(error).split())[:_LONGEST]
+    what = f"{type(error).__name__}: {text}".rstrip(": ")
+    return f"fjr failed unexpectedly ({what}); the traceback is in {path}."

@@ -1,0 +1,88 @@
+"""`fjr diagnose`: from bags and a nominal model to the cause of the gap and its report."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .cli_errors import reports_errors
+from .record_options import MapSignals, Periods, Resample, SamplesPerPeriod, TransientPeriods
+
+
+@reports_errors(kept="nothing was written, and an earlier diagnosis in the folder is as it was")
+def diagnose(
+    folder: Annotated[
+        Path, typer.Argument(metavar="REAL_FOLDER", help="Experiment folder with the rig's bags.")
+    ],
+    nominal: Annotated[
+        str,
+        typer.Option(
+            metavar="paper|FILE",
+            help="Datasheet of the bare plant: a ROS parameter file with all values below "
+            "/rig/simulator, or paper for the paper's values.",
+        ),
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER", help="Folder of the results; default: REAL_FOLDER/diagnosis."
+        ),
+    ] = None,
+    tolerance: Annotated[
+        float,
+        typer.Option(min=0.001, max=0.5, help="How far a datasheet value may be off, relative."),
+    ] = 0.1,
+    signal_map: MapSignals = None,
+    resample: Resample = None,
+    samples_per_period: SamplesPerPeriod = None,
+    transient_periods: TransientPeriods = None,
+    periods: Periods = None,
+) -> None:
+    """Tell why rig and simulation differ: where, by which effect, how far it closes the gap."""
+    from fjr_kit.installed import require_report_extra
+
+    require_report_extra()
+    from rich.console import Console
+
+    from fjr_interface.bags.reader import SignalMap, find_bags
+    from fjr_interface.resampling.accuracy import Resampling
+    from fjr_kit.folder_lock import locked_folder
+    from fjr_kit.invocation import call_date, command_line
+    from fjr_records.experiment_folder import Override
+    from fjr_records.recorded import read_experiment
+    from gap_diagnosis.investigation import investigate
+    from gap_diagnosis.model.nominal import read_nominal, refuse_wrong_units
+    from gap_diagnosis.report.gap_output import has_known_law, write_diagnosis
+
+    from .diagnosis_summary import print_summary
+    from .stage_progress import StageProgress
+
+    override = Override(samples_per_period, transient_periods, periods)
+    resampling = Resampling.parse(resample) if resample else None
+    values = read_nominal(nominal)
+    sources = SignalMap.parse(signal_map or [])
+    place = out or folder / "diagnosis"
+    find_bags(folder)
+    with locked_folder(place), StageProgress(transient=True) as progress:
+        progress.describe("reading bags")
+        recorded = read_experiment(folder, sources, override=override, resampling=resampling)
+        warning = refuse_wrong_units(recorded, values, nominal)
+        if warning:
+            progress.say(f"Warning: {warning}")
+        found = investigate(recorded, values, tolerance=tolerance, progress=progress.describe)
+        report = write_diagnosis(
+            found,
+            place,
+            progress=progress.describe,
+            command=command_line(),
+            date=call_date(),
+        )
+    print_summary(found.diagnosis, Console(), report.parent)
+    if found.diagnosis.parameters and not has_known_law(recorded):
+        typer.echo(
+            "Note: updated.yaml holds no controller, since the recorded one is unknown or no "
+            "pd_filtered law; fjr simulate would take the paper's."
+        )
+    typer.echo(report)

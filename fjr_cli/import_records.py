@@ -1,0 +1,124 @@
+"""`fjr import`: records of a rig without ROS become bags."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .cli_errors import reports_errors
+from .record_options import Periods, SamplesPerPeriod
+
+
+@reports_errors(kept="nothing was written")
+def import_records(
+    files: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="FILE...",
+            help="MAT, CSV, text, NPZ or JSON files, one run each, level by level; text and JSON "
+            "may be packed (.gz).",
+        ),
+    ],
+    column_map: Annotated[
+        list[str],
+        typer.Option(
+            "--map",
+            metavar="SIGNAL=[-]COLUMN[:UNIT]",
+            help="Column of torque and position, perhaps of reference, link and time, separated by "
+            "commas, by name or by number from 0: position=theta:deg,torque=iq:0.25,time=t:ms. The "
+            "unit may be a factor; a minus turns the sign.",
+        ),
+    ],
+    out: Annotated[
+        Path | None, typer.Option(help="Experiment folder to make; not with --dry-run.")
+    ] = None,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Show what is understood of the files; write nothing.")
+    ] = False,
+    controller: Annotated[
+        list[Path] | None,
+        typer.Option(
+            help="File that describes the controller (YAML or JSON): one for all files, or one for "
+            "each in their order. Gains may be unknown."
+        ),
+    ] = None,
+    sample_rate_hz: Annotated[
+        float | None,
+        typer.Option(
+            help="Sample rate; needed without a time column. With uneven stamps, the rate of the "
+            "grid onto which the signals are brought."
+        ),
+    ] = None,
+    samples_per_period: SamplesPerPeriod = None,
+    transient_periods: Annotated[
+        int, typer.Option(min=0, help="Leading periods that are transient.")
+    ] = 1,
+    periods: Periods = None,
+    repeat_reference: Annotated[
+        bool,
+        typer.Option(
+            "--repeat-reference", help="The reference column is one period, played repeatedly."
+        ),
+    ] = False,
+    skip_samples: Annotated[
+        int, typer.Option(min=0, help="Samples to leave out at the beginning.")
+    ] = 0,
+    keep_samples: Annotated[
+        int | None, typer.Option(min=1, help="Samples to keep after those; default: all.")
+    ] = None,
+    excited_harmonics: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FIRST:LAST:STEP,...",
+            help="Excited lines as multiples of 1/period; found in the reference if not given.",
+        ),
+    ] = None,
+    levels: Annotated[int, typer.Option(min=1, help="Amplitudes that the files hold.")] = 1,
+) -> None:
+    """Turn records of a rig without ROS into bags that every command reads."""
+    from fjr_interface.experiment import Experiment
+    from fjr_kit.errors import InputError
+    from fjr_records.importers.import_map import parse_harmonics, parse_map
+    from fjr_records.importers.importer import read_files, write_bags
+    from fjr_records.importers.record_file import ImportOptions
+
+    from .import_summary import summary
+
+    if out is None and not dry_run:
+        raise InputError("name the experiment folder with --out, or look first with --dry-run.")
+    if out is not None and (out.exists() or out.is_symlink()):
+        raise InputError(f"{out}: exists already; choose another folder or remove it.")
+    options = ImportOptions(
+        columns=parse_map([part for spec in column_map for part in spec.split(",")]),
+        sample_rate_hz=sample_rate_hz,
+        samples_per_period=samples_per_period,
+        transient_periods=transient_periods,
+        periods=periods,
+        skip_samples=skip_samples,
+        keep_samples=keep_samples,
+        excited_harmonics=tuple(parse_harmonics(excited_harmonics)) if excited_harmonics else None,
+        levels=levels,
+        repeat_reference=repeat_reference,
+        controllers=tuple(controller or ()),
+    )
+    understood = read_files(files, options)
+    for line in summary(understood, options.columns):
+        typer.echo(line)
+    for record in understood.records:
+        for doubt in record.doubts:
+            typer.echo(f"Warning: {record.path}: {doubt}.", err=True)
+    if dry_run or out is None:
+        typer.echo("Nothing was written. Next: the same command with --out FOLDER, no --dry-run.")
+        return
+    bags = write_bags(understood, out)
+    if isinstance(understood.descriptions[0], Experiment):
+        method = "" if len(bags) > 1 else " --method fast"
+        typer.echo(f"Next: fjr analyze {out}{method}")
+    else:
+        typer.echo(
+            f"Next: ros2 bag play {bags[0]}, or open the bags in PlotJuggler; analysis and "
+            "diagnosis of records that do not repeat are not there yet."
+        )
+    typer.echo(out)

@@ -1,0 +1,94 @@
+"""What `fjr import` has understood, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from fjr_interface.experiment import Experiment, RecordDescription
+from fjr_records.importers.import_map import Column
+from fjr_records.importers.importer import Understood
+from fjr_records.importers.record_file import SYMBOLS, Record
+from fjr_records.importers.repetition import Repetition
+
+_UNITS = {"reference": "rad", "torque": "N m", "position": "rad", "link": "rad"}
+
+
+def summary(understood: Understood, columns: Mapping[str, Column]) -> Iterator[str]:
+    """Yield the lines of the summary: each file, then what they are together."""
+    for record, one in zip(understood.records, understood.descriptions, strict=True):
+        yield from _file(record, one, columns)
+    yield from _together(understood)
+
+
+def _file(
+    record: Record, one: Experiment | RecordDescription, columns: Mapping[str, Column]
+) -> Iterator[str]:
+    seconds = record.samples / record.sample_rate_hz
+    yield (
+        f"{record.path.name}: level {one.level}, realization {one.realization}: {seconds:.6g} s at "
+        f"{record.sample_rate_hz:.6g} Hz, {record.samples} samples"
+    )
+    for quantity, symbol in SYMBOLS.items():
+        if symbol not in record.signals:
+            if quantity != "link":
+                yield f"  {quantity:<10} not recorded"
+            continue
+        values, unit = record.signals[symbol], _UNITS[quantity]
+        column = columns[quantity]
+        yield (
+            f"  {quantity:<10} rms {np.sqrt(np.mean(values**2)):.4g} {unit}, from "
+            f"{values.min():.4g} to {values.max():.4g} {unit} ({column.name}, times "
+            f"{column.factor:.6g})"
+        )
+    timing = record.timing
+    if timing.gaps:
+        yield f"  gaps       {timing.gaps}, the longest {timing.longest_gap_s:.4g} s"
+    else:
+        yield "  gaps       none"
+    found = record.repetition
+    if isinstance(found, Repetition):
+        base = record.sample_rate_hz / found.samples_per_period
+        yield (
+            f"  repeats    every {found.samples_per_period} samples ({1.0 / base:.6g} s): "
+            f"{found.transient_periods} transient and {found.periods} kept periods, "
+            f"{found.excited.size} excited lines from {found.excited[0] * base:.6g} to "
+            f"{found.excited[-1] * base:.6g} Hz"
+        )
+    else:
+        yield f"  repeats    not: {found}"
+    for note in record.notes:
+        yield f"  note       {note}."
+
+
+def _together(understood: Understood) -> Iterator[str]:
+    first = understood.descriptions[0]
+    runs = len(understood.descriptions)
+    repeats = sum(one.repeat_of is not None for one in understood.descriptions)
+    yield (
+        f"Together: {runs} run{'s' * (runs != 1)} at {first.levels} level"
+        f"{'s' * (first.levels != 1)}, {repeats} of them repeating another, described as "
+        + ("a periodic multisine." if isinstance(first, Experiment) else "records, not periodic.")
+    )
+    for one in understood.descriptions:
+        if one.repeat_of is not None:
+            yield f"  level {one.level}: realization {one.realization} repeats {one.repeat_of}"
+    for note in understood.notes:
+        yield f"  {note}."
+    yield f"  controller: {_controller(understood)}"
+
+
+def _controller(understood: Understood) -> str:
+    laws = {
+        "unknown"
+        if one.controller is None
+        else one.controller["kind"]
+        + (
+            f", unknown {', '.join(one.controller['unknown'])}"
+            if one.controller.get("unknown")
+            else ", all gains known"
+        )
+        for one in understood.descriptions
+    }
+    return "; ".join(sorted(laws))

@@ -1,0 +1,39 @@
+"""Options by which every command that reads records is told what the bags do not say."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+MapSignals = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--map",
+        metavar="SIGNAL=TOPIC:FIELD[JOINT]",
+        help="Where reference, torque or position stands in foreign bags, such as "
+        "position=/joint_states:position[elbow]; reference=none if there is none. Repeatable.",
+    ),
+]
+SamplesPerPeriod = Annotated[
+    int | None,
+    typer.Option(
+        min=2,
+        help="Samples of one period; found in the reference if not given.",
+    ),
+]
+Resample = Annotated[
+    str | None,
+    typer.Option(
+        metavar="auto|HZ",
+        help="Bring bags with jittered stamps, clocks of their own or lost samples onto one even "
+        "grid, at the rate of the reference or at HZ; the error is stated.",
+    ),
+]
+Periods = Annotated[
+    int | None, typer.Option(min=1, help="Periods to keep after the transient; default: all.")
+]
+TransientPeriods = Annotated[
+    int | None,
+    typer.Option(min=0, help="Periods to discard; default: as described, or found."),
+]

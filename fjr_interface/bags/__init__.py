@@ -1,0 +1,1 @@
+"""Bags of the interface: written, read in blocks, audited sample by sample."""

@@ -1,0 +1,1 @@
+"""Unevenly sampled signals brought onto one even grid, with the error stated."""

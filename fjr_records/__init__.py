@@ -1,0 +1,33 @@
+"""What was measured, from whatever source: the one reader of experiments.
+
+A folder of bags goes in; grid, levels, realizations and their samples come out, the same for
+analysis and diagnosis. Begin with `experiment_folder.open_experiment` (what the bags are, described
+or found by `discover`); `realization` reduces a bag to spectra in one pass, `recorded` holds an
+experiment whole; `lines`, `spectra`, `noise` and `encoder_step` are what both rest on. `importers`
+turn foreign files into bags.
+
+    >>> from fjr_records import open_experiment, read_experiment
+    >>> [(bag.level, bag.realization) for bag in open_experiment("rig").bags]
+    [(0, 0), (0, 1), (1, 0), (1, 1)]
+    >>> first = read_experiment("rig").realizations[0]
+    >>> first.position.shape  # in rad; periods, the transient ones first, by samples of a period
+    (4, 1000)
+"""
+
+from typing import TYPE_CHECKING
+
+from fjr_kit.public_names import deferred_names
+
+if TYPE_CHECKING:
+    from .experiment_folder import ExperimentFolder, Override, open_experiment
+    from .recorded import RecordedExperiment, read_experiment
+else:
+    __getattr__, __dir__ = deferred_names(__name__)
+
+__all__ = [
+    "ExperimentFolder",
+    "Override",
+    "RecordedExperiment",
+    "open_experiment",
+    "read_experiment",
+]

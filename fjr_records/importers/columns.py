@@ -1,0 +1,86 @@
+"""Columns of numbers from any file in which a rig without ROS keeps its records."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from fjr_interface.bags.audit import LARGEST
+from fjr_kit.errors import InputError
+
+from . import json_log, mat, npz, text
+from .source import Names, refuse_bomb, sample_axis
+
+READERS: dict[str, Callable[[Path], Names]] = {
+    ".mat": mat.open_mat,
+    ".npz": npz.open_npz,
+    ".csv": text.open_text,
+    ".tsv": text.open_text,
+    ".txt": text.open_text,
+    ".dat": text.open_text,
+    ".json": json_log.open_json,
+    ".jsonl": json_log.open_json,
+    ".ndjson": json_log.open_json,
+}
+"""What reads a file, by its suffix; each may be followed by .gz where it holds text."""
+_TEXTS = tuple(suffix for suffix in READERS if suffix not in (".mat", ".npz"))
+
+
+def read_columns(path: str | Path, names: Sequence[str]) -> dict[str, np.ndarray]:
+    """Read named columns of a file.
+
+    A field of a structure is named `structure.field`, a signal in a matrix `matrix[0]`, counted
+    from 0 along its shorter side; a column of a text without names `0`, `1`, ...
+
+    Args:
+        path: the file; its suffix tells the format, see `READERS`.
+        names: the columns to read.
+
+    Returns:
+        {name: float64 (samples,)}.
+
+    Raises:
+        InputError: the file cannot be read, lacks a column (those that are there are named), or a
+            column holds something that is not a finite real number.
+    """
+    path = Path(path)
+    suffixes = [suffix.lower() for suffix in path.suffixes[-2:]]
+    packed = suffixes[-1:] == [".gz"]
+    suffix = suffixes[-2] if packed and len(suffixes) > 1 else path.suffix.lower()
+    if suffix not in (_TEXTS if packed else READERS):
+        raise InputError(
+            f"{path}: cannot tell the format by the suffix {path.suffix!r}; it must be one of "
+            f"{', '.join(READERS)}, or text with .gz behind."
+        )
+    if not path.is_file():
+        raise InputError(f"{path}: there is no such file.")
+    try:
+        found = READERS[suffix](path)
+        return {name: _numbers(path, name, found.column(name)) for name in names}
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror or error}).") from None
+    except RecursionError:
+        raise InputError(f"{path}: is nested too deeply to be a record.") from None
+
+
+def _numbers(path: Path, name: str, column: np.ndarray) -> np.ndarray:
+    """Return a column as float64 (samples,); raise InputError unless it is finite and real."""
+    if column.dtype.kind not in "fiub":
+        raise InputError(f"{path}: {name} does not hold real numbers; choose another column.")
+    if column.ndim != 1 and sum(size != 1 for size in column.shape) > 1:
+        shape = " x ".join(map(str, column.shape))
+        which = "columns" if sample_axis(column.shape) == 0 else "rows"
+        raise InputError(
+            f"{path}: {name} is a matrix ({shape}); name one of its {which}, such as {name}[0]."
+        )
+    refuse_bomb(path, 8 * column.size)
+    numbers = column.astype(float).ravel()
+    bad = np.flatnonzero(~(np.abs(numbers) <= LARGEST))
+    if bad.size:
+        raise InputError(
+            f"{path}: {name} holds {numbers[bad[0]]} at sample {bad[0]} and {bad.size - 1} more "
+            "such values; repair or cut the record."
+        )
+    return numbers

@@ -1,0 +1,99 @@
+"""The map of `fjr import`: which column is which quantity, in which unit, and which lines."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from fjr_kit.errors import InputError
+
+_ANGLE = {"rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "deg": math.pi / 180.0, "rev": 2.0 * math.pi}
+_TORQUE = {"N m": 1.0, "Nm": 1.0, "mN m": 1e-3, "mNm": 1e-3, "kN m": 1e3, "kNm": 1e3}
+_TIME = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+UNITS: Mapping[str, Mapping[str, float]] = {
+    "reference": _ANGLE,
+    "torque": _TORQUE,
+    "position": _ANGLE,
+    "link": _ANGLE,
+    "time": _TIME,
+}
+"""Units of each quantity with their factors to rad, N m and s; the first is the default."""
+GREATEST_FACTOR = 1e12
+"""A factor to SI lies between this and its inverse."""
+REQUIRED = ("torque", "position")
+
+
+@dataclass(frozen=True)
+class Column:
+    """Where a quantity stands in a file, and the factor from there to SI.
+
+    Attributes:
+        name: of the column.
+        factor: to SI, with the sign.
+        by_factor: whether the factor was given as a number, so that the column may be anything: a
+            current that stands for the torque, a voltage that stands for the reference.
+    """
+
+    name: str
+    factor: float = 1.0
+    by_factor: bool = False
+
+    @classmethod
+    def parse(cls, quantity: str, text: str) -> Column:
+        """Parse `[-]column[:unit or factor]`; raise InputError on anything else."""
+        name, _, unit = text.partition(":")
+        sign, name = (-1.0, name[1:]) if name.startswith("-") else (1.0, name)
+        units = UNITS[quantity]
+        factor = units.get(unit or next(iter(units)))
+        if factor is None:
+            try:
+                factor = float(unit) if unit.isascii() else math.nan
+            except ValueError:
+                factor = math.nan
+        if not name or not 1.0 / GREATEST_FACTOR <= abs(factor) <= GREATEST_FACTOR:
+            raise InputError(
+                f"{quantity}={text} is not understood; write {quantity}=[-]column[:unit] with one "
+                f"of the units {', '.join(units)}, or with a factor to {next(iter(units))}."
+            )
+        return cls(name.strip(), sign * factor, unit not in units and bool(unit))
+
+
+def parse_map(specs: Sequence[str]) -> dict[str, Column]:
+    """Parse `quantity=[-]column[:unit]` for reference, torque, position, link and time.
+
+    Raises:
+        InputError: a quantity or unit is unknown, named twice, or torque or position is missing.
+    """
+    columns: dict[str, Column] = {}
+    for spec in specs:
+        quantity, equals, source = spec.strip().partition("=")
+        if not equals or quantity not in UNITS or quantity in columns:
+            raise InputError(
+                f"the map {spec!r} is not understood; give each of {', '.join(UNITS)} at most "
+                "once, as quantity=column."
+            )
+        columns[quantity] = Column.parse(quantity, source)
+    missing = [quantity for quantity in REQUIRED if quantity not in columns]
+    if missing:
+        raise InputError(f"the map lacks {' and '.join(missing)}; add {missing[0]}=column.")
+    return columns
+
+
+def parse_harmonics(text: str) -> list[int]:
+    """Parse `13:249:4,300` (first:last:step, both ends included); raise InputError otherwise."""
+    harmonics: set[int] = set()
+    for part in text.split(","):
+        try:
+            if not part.isascii():
+                raise ValueError
+            first, *rest = (int(number) for number in part.split(":"))
+            last, step = (*rest, 1)[:2] if rest else (first, 1)
+            if len(rest) > 2 or first < 1 or step < 1 or last < first or last > 10**8:
+                raise ValueError
+        except ValueError:
+            raise InputError(
+                f"the harmonics {text!r} are not understood; write 1,3,7 or first:last:step."
+            ) from None
+        harmonics.update(range(first, last + 1, step))
+    return sorted(harmonics)

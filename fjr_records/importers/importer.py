@@ -1,0 +1,150 @@
+"""From records of a rig without ROS to bags of the interface: `fjr import`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.signal import lfilter
+
+from controller_node import controller_file, transfer_function
+from fjr_interface.bags.folder_names import bag_folder
+from fjr_interface.bags.writer import BagWriter
+from fjr_interface.topics import LINK_POSITION, MOTOR_POSITION, MOTOR_TORQUE, REFERENCE
+from fjr_kit.atomic import new_folder
+from fjr_kit.errors import InputError
+
+from .describe import Description, describe
+from .record_file import ImportOptions, Record, Samples, read_samples, understand
+
+WRONG_CONTROLLER = 0.5
+"""Greatest rms difference of the recorded torque from that of a known law, relative to it."""
+_SETTLE = 0.1
+
+
+@dataclass(frozen=True)
+class Understood:
+    """The files as they would be written.
+
+    Attributes:
+        records: what was read, in the order of the files.
+        descriptions: of each.
+        notes: sentences on what differs between the files.
+    """
+
+    records: tuple[Record, ...]
+    descriptions: tuple[Description, ...]
+    notes: tuple[str, ...]
+
+
+def read_files(files: Sequence[str | Path], options: ImportOptions) -> Understood:
+    """Read and understand files; nothing is written.
+
+    Args:
+        files: one run each, in the order level by level, realization by realization.
+        options: how to understand them.
+
+    Raises:
+        InputError: a file cannot be used, or the files do not belong together.
+    """
+    if options.levels < 1 or not files or len(files) % options.levels:
+        raise InputError(
+            f"{len(files)} files cannot be {options.levels} levels of equally many realizations; "
+            "give as many files for each level."
+        )
+    if len(options.controllers) not in (0, 1, len(files)):
+        raise InputError(
+            f"{len(options.controllers)} controllers are given for {len(files)} files; give one "
+            "for all, or one for each file in their order."
+        )
+    laws = [controller_file.read_controller(path) for path in options.controllers]
+    samples = [read_samples(Path(file), options) for file in files]
+    rate = _grid_rate(samples)
+    records = [understand(each, rate or each.timing.rate_hz, options) for each in samples]
+    controllers: list[dict[str, Any] | None] = [None] * len(records)
+    for number, record in enumerate(records) if laws else ():
+        which = number if len(laws) > 1 else 0
+        source = str(options.controllers[which])
+        controllers[number] = controller_file.describe(laws[which], record.sample_rate_hz, source)
+        _check_controller(record, controllers[number] or {}, source)
+    descriptions, notes = describe(records, options.levels, controllers, options.columns)
+    return Understood(tuple(records), tuple(descriptions), tuple(notes))
+
+
+def _grid_rate(samples: Sequence[Samples]) -> float | None:
+    """Return the rate onto which all files are brought: the slowest, if one must be resampled."""
+    if all(each.timing.stamps_s is None for each in samples):
+        return None
+    even = [each.timing.rate_hz for each in samples if each.timing.stamps_s is None]
+    return even[0] if even else min(each.timing.rate_hz for each in samples)
+
+
+def _check_controller(record: Record, controller: dict[str, Any], source: str) -> None:
+    """Refuse a controller, known in all its gains, that does not give the recorded torque."""
+    if "r" not in record.signals or "unknown" in controller:
+        return
+    r, u, y = (record.signals[symbol] for symbol in "ruy")
+    if controller["kind"] == controller_file.TWO_DEGREES:
+        laws = [controller["reference"], controller["position"]]
+    else:
+        one = transfer_function.as_transfer_function(
+            transfer_function.law_of(controller, record.sample_rate_hz)
+        )
+        laws = [{"numerator": one.numerator, "denominator": one.denominator}] * 2
+    with np.errstate(all="ignore"):
+        expected = lfilter(laws[0]["numerator"], laws[0]["denominator"], r) - lfilter(
+            laws[1]["numerator"], laws[1]["denominator"], y
+        )
+    limit = controller.get("torque_limit_nm")
+    expected = expected if limit is None else np.clip(expected, -limit, limit)
+    settled = slice(int(_SETTLE * u.size), None)
+    scale = float(np.std(u[settled]))
+    with np.errstate(all="ignore"):
+        off = float(np.std((expected - u)[settled])) / scale if scale > 0 else 0.0
+    if not off <= WRONG_CONTROLLER:
+        raise InputError(
+            f"{source}: this controller gives a torque that differs by {min(off, 1e9):.0%} from "
+            f"that in {record.path}; correct gains, units or signs, or mark gains as unknown."
+        )
+
+
+def write_bags(understood: Understood, out: Path) -> list[Path]:
+    """Write one bag for each file, all or none; return their folders.
+
+    Raises:
+        InputError: the folder exists, is being written, or cannot be written.
+    """
+    with new_folder(out) as hidden:
+        for record, one in zip(understood.records, understood.descriptions, strict=True):
+            there = (REFERENCE, MOTOR_POSITION, MOTOR_TORQUE, LINK_POSITION)
+            signals = tuple(signal for signal in there if signal.symbol in record.signals)
+            folder = bag_folder(hidden, one.level, one.realization)
+            with BagWriter(folder, one, signals=signals) as bag:
+                bag.write_arrays(**record.signals)
+    return [bag_folder(out, one.level, one.realization) for one in understood.descriptions]
+
+
+def import_files(
+    files: Sequence[str | Path], out: str | Path, options: ImportOptions
+) -> list[tuple[Description, Path]]:
+    """Turn each file into the bag of one realization, all or none.
+
+    Args:
+        files: as in `read_files`.
+        out: the experiment folder to make.
+        options: how to understand them.
+
+    Returns:
+        The description and folder of each bag.
+
+    Raises:
+        InputError: see `read_files` and `write_bags`.
+    """
+    out = Path(out)
+    if out.exists():
+        raise InputError(f"{out}: exists already; choose another folder or remove it.")
+    understood = read_files(files, options)
+    return list(zip(understood.descriptions, write_bags(understood, out), strict=True))

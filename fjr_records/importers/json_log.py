@@ -1,0 +1,108 @@
+"""JSON logs: an object of lists, a list of entries somewhere in it, or one entry on each line."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fjr_kit.errors import InputError, shown
+
+from .source import Names, read_text, refuse_bomb
+
+_BYTES_OF_A_NODE, _LEAST = 80, 2**28
+"""What a value takes in memory once it is parsed, and what any file may take."""
+
+
+def open_json(path: Path) -> Names:
+    """Open a JSON log; raise InputError.
+
+    A column is named by its path: `entries.position` is the field `position` of each object in the
+    list `entries`, `entries[1]` the second number of each row in it; `position` alone is the field
+    of entries that are the file itself, or stand on a line each.
+    """
+    text = read_text(path)
+    refuse_bomb(path, _BYTES_OF_A_NODE * sum(map(text.count, ",[{")), _LEAST)
+    content = _parse(path, text)
+    return Names(path, _known(content), lambda name: _column(path, content, name))
+
+
+def _parse(path: Path, text: str) -> Any:
+    try:
+        return json.loads(text)
+    except ValueError as error:
+        lines = [line for line in text.splitlines() if line.strip()]
+        if len(lines) > 1 and lines[0].lstrip()[:1] in "{[":
+            return [_line(path, number, line) for number, line in enumerate(lines, 1)]
+        raise InputError(f"{path}: is not JSON ({_what(error)}).") from None
+
+
+def _line(path: Path, number: int, line: str) -> Any:
+    try:
+        return json.loads(line)
+    except ValueError as error:
+        raise InputError(f"{path}: is not JSON: entry {number} ({_what(error)}).") from None
+
+
+def _what(error: ValueError) -> str:
+    return str(error).splitlines()[0].rstrip(".")[:80]
+
+
+def _known(content: Any, prefix: str = "") -> list[str]:
+    """Return the paths of all columns, as the first entry of each list shows them."""
+    if isinstance(content, dict):
+        inside = [
+            _known(value, f"{prefix}.{key}" if prefix else key) for key, value in content.items()
+        ]
+        return [path for paths in inside for path in paths]
+    if not isinstance(content, list) or not content:
+        return []
+    if isinstance(content[0], dict):
+        return [
+            f"{prefix}.{key}" if prefix else key
+            for key, value in content[0].items()
+            if not isinstance(value, (dict, str))
+        ] + [
+            path
+            for key, value in content[0].items()
+            if isinstance(value, dict)
+            for path in (f"{prefix}.{key}.{k}" if prefix else f"{key}.{k}" for k in value)
+        ]
+    return [prefix]
+
+
+def _column(path: Path, content: Any, name: str) -> np.ndarray:
+    """Return the column of a path; every entry must have a number, or a row of them."""
+    values = list(_walk(path, content, name.split(".") if name else [], name))
+    try:
+        column = np.array(values[0] if len(values) == 1 else values)
+    except ValueError:
+        raise InputError(f"{path}: {name} has rows of different lengths.") from None
+    if column.dtype.kind in "fiub":
+        return column
+    for at, value in enumerate(values[0] if len(values) == 1 else values):
+        if not isinstance(value, (int, float, list)):
+            raise InputError(f"{path}: {name} is {shown(value)} in entry {at}, not a number.")
+    raise InputError(f"{path}: {name} does not hold real numbers; choose another column.")
+
+
+def _walk(path: Path, value: Any, keys: list[str], name: str, at: int = -1) -> Iterator[Any]:
+    """Yield the value at the end of the path, in each entry if a list is on the way."""
+    for done in range(len(keys)):
+        if isinstance(value, list):
+            for number, entry in enumerate(value):
+                yield from _walk(path, entry, keys[done:], name, number)
+            return
+        key = keys[done]
+        rest = ".".join(keys[done:])
+        if isinstance(value, dict) and rest in value:  # a key with a dot in it
+            value = value[rest]
+            break
+        if not isinstance(value, dict) or key not in value:
+            where = f"entry {at}" if at >= 0 else "the file"
+            raise InputError(f"{path}: {where} has no {name}; repair or cut the record.")
+        value = value[key]
+    yield value

@@ -1,0 +1,192 @@
+"""One file, read and understood: its signals on an even grid, its period, and what is doubtful."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from fjr_kit.errors import InputError
+
+from . import coherence
+from .columns import read_columns
+from .import_map import Column
+from .repetition import Repetition, find_repetition
+from .stamps import Timing, read_timing, resample
+
+SYMBOLS = {"reference": "r", "torque": "u", "position": "y", "link": "q"}
+LEAST_SAMPLES = 16
+_HALF = 2**15
+
+
+@dataclass(frozen=True)
+class ImportOptions:
+    """What the files do not say themselves; None is found in them.
+
+    Attributes:
+        columns: where each quantity stands, from `parse_map`.
+        sample_rate_hz: needed without a time column; with an uneven one, the rate of the grid.
+        samples_per_period: N.
+        transient_periods: leading periods to discard.
+        periods: periods to keep after those; None keeps all whole ones.
+        skip_samples: samples to leave out at the beginning.
+        keep_samples: samples to keep after those; None keeps all.
+        excited_harmonics: excited lines.
+        levels: number of amplitudes; the files come level by level.
+        repeat_reference: whether the reference is one period, played again and again.
+        controllers: files that describe the controller: none, one for all, or one for each file.
+    """
+
+    columns: Mapping[str, Column]
+    sample_rate_hz: float | None = None
+    samples_per_period: int | None = None
+    transient_periods: int = 1
+    periods: int | None = None
+    skip_samples: int = 0
+    keep_samples: int | None = None
+    excited_harmonics: tuple[int, ...] | None = None
+    levels: int = 1
+    repeat_reference: bool = False
+    controllers: tuple[Path, ...] = ()
+
+
+@dataclass(frozen=True)
+class Samples:
+    """The columns of one file, in SI, as they stand there.
+
+    Attributes:
+        path: the file.
+        values: {quantity: float64 (samples,)}, without time.
+        timing: what its time column says.
+        notes: what was done to them.
+    """
+
+    path: Path
+    values: Mapping[str, np.ndarray]
+    timing: Timing
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Record:
+    """One file on an even grid.
+
+    Attributes:
+        path: the file.
+        sample_rate_hz: rate of the grid.
+        signals: {symbol: float64 (samples,)} in SI.
+        timing: what its time column says.
+        repetition: its period, or a clause that says why there is none.
+        notes: what was done to the signals.
+        doubts: what is evidently wrong, but might be meant.
+    """
+
+    path: Path
+    sample_rate_hz: float
+    signals: Mapping[str, np.ndarray]
+    timing: Timing
+    repetition: Repetition | str
+    notes: tuple[str, ...]
+    doubts: tuple[str, ...]
+
+    @property
+    def samples(self) -> int:
+        """Number of samples."""
+        return self.signals["y"].size
+
+
+def read_samples(path: Path, options: ImportOptions) -> Samples:
+    """Read the columns of one file; raise InputError."""
+    columns = options.columns
+    arrays = read_columns(path, [column.name for column in columns.values()])
+    unsigned = [
+        q for q, column in columns.items() if q != "time" and _lost_sign(arrays[column.name])
+    ]
+    for name in {columns[quantity].name for quantity in unsigned}:
+        arrays[name] = np.where(arrays[name] >= _HALF, arrays[name] - 2 * _HALF, arrays[name])
+    notes = tuple(
+        f"{quantity} is a 16-bit word that was read without its sign: 65535 is taken as -1"
+        for quantity in unsigned
+    )
+    values = {q: column.factor * arrays[column.name] for q, column in columns.items()}
+    size = values["position"].size
+    if options.repeat_reference and 0 < values.get("reference", np.empty(0)).size <= size:
+        values["reference"] = np.resize(values["reference"], size)
+    for quantity, each in values.items():
+        if each.size != size:
+            raise InputError(
+                f"{path}: {columns[quantity].name} has {each.size} samples, but "
+                f"{columns['position'].name} has {size}; they must be of one length, or "
+                "--repeat-reference plays a single period of the reference again and again."
+            )
+    first = options.skip_samples
+    last = size if options.keep_samples is None else first + options.keep_samples
+    values = {quantity: each[first:last] for quantity, each in values.items()}
+    left = values["position"].size
+    if not left:
+        raise InputError(f"{path}: no samples are left after {first} skipped ones.")
+    if left < LEAST_SAMPLES:
+        raise InputError(
+            f"{path}: {left} samples are too few for a record; give {LEAST_SAMPLES} or more."
+        )
+    timing = read_timing(path, values.pop("time", None), options.sample_rate_hz)
+    if timing.kept is not None:
+        values = {quantity: each[timing.kept] for quantity, each in values.items()}
+    return Samples(path, values, timing, notes)
+
+
+def _lost_sign(column: np.ndarray) -> bool:
+    """Tell whether whole numbers up to 65535 crowd at both ends, with nothing between."""
+    if column.size < 2 or column.min() < 0 or not _HALF <= column.max() < 2 * _HALF:
+        return False
+    between = (column > _HALF // 2) & (column < 3 * _HALF // 2)
+    return not between.any() and bool((column < _HALF).any()) and bool((column % 1 == 0).all())
+
+
+def understand(samples: Samples, rate_hz: float, options: ImportOptions) -> Record:
+    """Bring a file onto the grid and find its period; raise InputError where it cannot be right."""
+    path, timing, values = samples.path, samples.timing, samples.values
+    notes = (*samples.notes, *timing.notes)
+    if timing.stamps_s is not None:
+        values, errors = resample(path, timing, values, rate_hz)
+        notes += errors
+    signals = {SYMBOLS[quantity]: each for quantity, each in values.items()}
+    if not np.ptp(signals["y"]) > 0:
+        raise InputError(f"{path}: the position is constant; map the column that carries it.")
+    found = find_repetition(str(path), signals, rate_hz, options)
+    repetition = found if isinstance(found, Repetition) else None
+    doubts = _unit_doubts(path, signals, repetition, options.columns)
+    other = coherence.unrelated(signals, repetition)
+    if other is not None:
+        raise InputError(f"{path}: {other}.")
+    if repetition is not None:
+        signals = {symbol: each[: repetition.samples] for symbol, each in signals.items()}
+        notes += repetition.notes
+    return Record(path, rate_hz, signals, timing, found, notes, doubts)
+
+
+def _unit_doubts(
+    path: Path,
+    signals: Mapping[str, np.ndarray],
+    repetition: Repetition | None,
+    columns: Mapping[str, Column],
+) -> tuple[str, ...]:
+    """Refuse angles in different units; doubt them where a factor, or a rig that sticks, may be."""
+    pairs = []
+    if "reference" in columns and not columns["reference"].by_factor:  # else it is a current, say
+        pairs.append(("position", "reference", coherence.angle_ratio(signals, repetition)))
+    if "q" in signals and np.ptp(signals["q"]) > 0:
+        ratio = float(np.std(signals["q"]) / np.std(signals["y"]))
+        pairs.append(("link", "position", ratio))
+    doubts = []
+    for one, other, ratio in pairs:
+        doubt = coherence.unit_doubt(ratio, one, other)
+        if doubt is None:
+            continue
+        meant = columns[one].by_factor or columns[other].by_factor
+        if not (meant or (one == "position" and coherence.may_stick(ratio))):
+            raise InputError(f"{path}: {doubt}.")
+        doubts.append(doubt)
+    return tuple(doubts)

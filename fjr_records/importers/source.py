@@ -1,0 +1,105 @@
+"""What all file formats share: columns by name, and a bound on what a file may unpack to."""
+
+from __future__ import annotations
+
+import gzip
+import re
+import zlib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fjr_kit.errors import InputError
+
+_INDEXED = re.compile(r"(?P<name>.*)\[(?P<index>[0-9]{1,9})\]")
+LEAST_BYTES, EXPANSION = 2**25, 32
+"""A file may hold so many bytes of numbers, and so many times its size: a few hundred bytes of an
+archive can stand for gigabytes."""
+_SHOWN = 20
+"""Most names of columns that a sentence shows."""
+
+
+@dataclass(frozen=True)
+class Names:
+    """The columns of an open file.
+
+    Attributes:
+        path: the file.
+        known: the names that are there.
+        find: returns the array of a name.
+        unlisted: names that `find` takes as well, but that no sentence lists.
+    """
+
+    path: Path
+    known: Sequence[str]
+    find: Callable[[str], Any]
+    unlisted: Sequence[str] = ()
+
+    def column(self, name: str) -> np.ndarray:
+        """Return the array `name`, or the signal i of a matrix for `name[i]`; raise InputError."""
+        if name in self.known or name in self.unlisted:
+            return np.asarray(self.find(name))
+        match = _INDEXED.fullmatch(name)
+        if match is None or match["name"] not in self.known:
+            raise self.missing(name if match is None else match["name"] or name)
+        matrix, index = np.asarray(self.find(match["name"])), int(match["index"])
+        axis = sample_axis(matrix.shape)
+        if matrix.ndim != 2 or index >= matrix.shape[1 - axis]:
+            shape = " x ".join(map(str, matrix.shape))
+            raise InputError(
+                f"{self.path}: {match['name']} is {shape}, so there is no {name}; signals count "
+                "from 0."
+            )
+        return matrix[:, index] if axis == 0 else matrix[index]
+
+    def missing(self, name: str) -> InputError:
+        """Return the error for a name that is not there."""
+        there = ", ".join(each[:_SHOWN] for each in self.known[:_SHOWN]) or "nothing"
+        more = f" and {len(self.known) - _SHOWN} more" if len(self.known) > _SHOWN else ""
+        return InputError(f"{self.path}: there is no {name}; the file holds {there}{more}.")
+
+
+def sample_axis(shape: tuple[int, ...]) -> int:
+    """Return along which side of a matrix the samples lie: the longer one, else the first."""
+    return 1 if len(shape) == 2 and shape[1] > shape[0] else 0
+
+
+def refuse_bomb(path: Path, size: int, least: int = LEAST_BYTES) -> None:
+    """Raise InputError if so many bytes of numbers are more than a file of honest records holds."""
+    if size > max(least, EXPANSION * path.stat().st_size):
+        raise InputError(
+            f"{path}: its {path.stat().st_size} bytes stand for {size:.2g} bytes of numbers, as no "
+            "measured record does; write it again without compression."
+        )
+
+
+def read_text(path: Path) -> str:
+    """Return the text of a file, unpacked if it ends in `.gz`; raise InputError if it is none.
+
+    UTF-8 and UTF-16 with a mark are told; what is neither is taken for Latin-1, as loggers on
+    Windows write it, unless it holds zero bytes.
+    """
+    content = _unpacked(path) if path.suffix.lower() == ".gz" else path.read_bytes()
+    utf_16 = content[:2] in (b"\xff\xfe", b"\xfe\xff")
+    for encoding in ("utf-16",) if utf_16 else ("utf-8-sig", "latin-1"):
+        try:
+            text = content.decode(encoding)
+        except UnicodeDecodeError:
+            continue
+        if "\0" not in text:
+            return text
+    raise InputError(f"{path}: is not a text file in UTF-8.")
+
+
+def _unpacked(path: Path) -> bytes:
+    most = max(LEAST_BYTES, EXPANSION * path.stat().st_size)
+    try:
+        with gzip.open(path) as file:
+            content = file.read(most + 1)
+    except (EOFError, zlib.error, gzip.BadGzipFile):
+        raise InputError(f"{path}: is not a whole gzip file; pack it again.") from None
+    refuse_bomb(path, len(content))
+    return content

@@ -1,0 +1,220 @@
+"""Time columns: even, coarse, jittered or wild, and the signals on one even grid.
+
+Stamps that lie on a straight line up to their own resolution are even ones that were rounded. Those
+of a jittered clock are resampled as the signals of a bag are. Where no clock can be followed at
+all, signals are joined by straight lines. The error is stated either way.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from fjr_interface.resampling.accuracy import LEAST_SAMPLES, Survey
+from fjr_interface.resampling.grid_stream import Grid, GridStream
+from fjr_kit.errors import InputError
+
+FASTEST_HZ = 1e6
+"""Greatest sample rate of an experiment description."""
+UNEVEN = 0.01
+"""Greatest deviation of one time step from the mean one, relative to it, of even stamps."""
+GREATEST_ERROR = 0.2
+"""Greatest rms error of the position by straight lines, relative to its rms."""
+MOST_SAMPLES = 16
+"""Most samples of the grid for each sample of the file."""
+_PIECE = 4096
+_GAP = 1.5
+_ROUNDING = 0.75
+"""Greatest distance of rounded stamps from a straight line, in units of their last digit."""
+
+
+@dataclass(frozen=True)
+class Timing:
+    """What a time column says.
+
+    Attributes:
+        stamps_s: the stamps, strictly rising, float64 (samples,); None where they are even.
+        rate_hz: mean sample rate.
+        gaps: steps longer than 1.5 usual ones.
+        longest_gap_s: the longest of them, 0 without any.
+        notes: what was taken how, sentences without the file's name.
+        kept: indices of the samples to use; None for all.
+    """
+
+    stamps_s: np.ndarray | None
+    rate_hz: float
+    gaps: int = 0
+    longest_gap_s: float = 0.0
+    notes: tuple[str, ...] = ()
+    kept: np.ndarray | None = None
+
+
+def read_timing(path: Path, time: np.ndarray | None, given_hz: float | None) -> Timing:
+    """Understand the time column of a file, in s; raise InputError."""
+    if time is None:
+        if given_hz is None or not 0 < given_hz <= FASTEST_HZ:
+            raise InputError(
+                f"{path}: give a sample rate of up to {FASTEST_HZ:g} Hz, or map a time column."
+            )
+        return Timing(None, given_hz)
+    if time.size < 2 or not time[-1] > time[0]:
+        raise InputError(f"{path}: the time column does not increase; map another column.")
+    step = (time[-1] - time[0]) / (time.size - 1)
+    if step * FASTEST_HZ < 1.0:
+        raise InputError(
+            f"{path}: the time column goes on by {step:g} s, more than {FASTEST_HZ:g} samples in a "
+            "second; correct its unit."
+        )
+    steps = np.diff(time)
+    falling = np.flatnonzero(steps < 0)
+    if falling.size:
+        at = int(falling[0])
+        raise InputError(
+            f"{path}: the time column goes back from {time[at]:g} to {time[at + 1]:g} s after "
+            f"sample {at}; map another column, or cut the record there."
+        )
+    if (np.abs(steps - step) <= UNEVEN * step).all():
+        return Timing(None, _same(path, _whole(1.0 / step, 1e-6), given_hz))
+    rounded = _rounded_rate(time)
+    if rounded is not None:
+        rate, digit = rounded
+        note = f"its stamps are rounded to {digit:g} s and taken as even, {rate:.6g} samples/s"
+        return Timing(None, _same(path, rate, given_hz), notes=(note,))
+    return _uneven(path, time, given_hz)
+
+
+def _uneven(path: Path, time: np.ndarray, given_hz: float | None) -> Timing:
+    kept = np.concatenate([[True], np.diff(time) > 0])
+    notes: tuple[str, ...] = ()
+    if not kept.all():
+        notes = (f"{np.sum(~kept)} samples repeat the stamp before them and are left out",)
+    stamps = time[kept]
+    if stamps.size < 3:
+        raise InputError(f"{path}: the time column has {stamps.size} different stamps; too few.")
+    steps = np.diff(stamps)
+    usual = float(np.median(steps))
+    gaps = steps[steps > _GAP * usual]
+    rate = given_hz or _three_digits((stamps.size - 1) / (stamps[-1] - stamps[0]))
+    return Timing(
+        stamps, rate, gaps.size, float(gaps.max(initial=0.0)), notes, np.flatnonzero(kept)
+    )
+
+
+def _three_digits(rate: float) -> float:
+    return float(f"{rate:.3g}")
+
+
+def _same(path: Path, rate: float, given: float | None) -> float:
+    if given is not None and abs(rate - given) > 1e-4 * given:
+        raise InputError(
+            f"{path}: the time column says {rate:g} Hz, not {given:g} Hz; leave one of them out."
+        )
+    return float(given or rate)
+
+
+def _whole(rate: float, tolerance: float) -> float:
+    return float(round(rate)) if abs(rate - round(rate)) < tolerance * rate else rate
+
+
+def _rounded_rate(time: np.ndarray) -> tuple[float, float] | None:
+    """Return rate and last digit (s) of stamps that are even but for their rounding, else None."""
+    digit = next((d for d in 10.0 ** -np.arange(0, 10) if _multiples(time, d)), None)
+    if digit is None:
+        return None
+    k = np.arange(time.size) - (time.size - 1) / 2.0
+    slope = float(k @ time / (k @ k))
+    if np.abs(time - time.mean() - slope * k).max() > _ROUNDING * digit:
+        return None
+    return _whole(1.0 / slope, 4.0 * digit / (time[-1] - time[0])), float(digit)
+
+
+def _multiples(time: np.ndarray, digit: float) -> bool:
+    counts = time / digit
+    return bool((np.abs(counts - np.rint(counts)) < 1e-4).all())
+
+
+def resample(
+    path: Path, timing: Timing, signals: Mapping[str, np.ndarray], rate_hz: float
+) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
+    """Bring unevenly sampled signals onto a grid.
+
+    Args:
+        path: the file.
+        timing: its time column, uneven.
+        signals: {name in `Record`: float64 (samples,)}.
+        rate_hz: of the grid.
+
+    Returns:
+        The signals on the grid, and sentences on the error of each.
+
+    Raises:
+        InputError: they cannot be brought there faithfully.
+    """
+    stamps = timing.stamps_s
+    assert stamps is not None
+    if (stamps[-1] - stamps[0]) * rate_hz > MOST_SAMPLES * stamps.size + LEAST_SAMPLES:
+        raise InputError(
+            f"{path}: {stamps.size} samples in {stamps[-1] - stamps[0]:g} s are too few for "
+            f"{rate_hz:g} Hz; give a lower sample rate."
+        )
+    try:
+        return _as_bags_are(path, stamps, signals, rate_hz)
+    except InputError as why:
+        return _by_lines(path, stamps, signals, rate_hz, str(why))
+
+
+def _as_bags_are(
+    path: Path, stamps_s: np.ndarray, signals: Mapping[str, np.ndarray], rate_hz: float
+) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
+    stamps = np.rint((stamps_s - stamps_s[0]) * 1e9).astype(np.int64)
+    pieces = [slice(at, at + _PIECE) for at in range(0, stamps.size, _PIECE)]
+    out, sentences = {}, []
+    for name, values in signals.items():
+        survey = Survey(str(path), name, name)
+        for piece in pieces:
+            survey.add(stamps[piece], values[piece])
+        found = survey.finish()
+        last = math.floor((found.last_ns - found.first_ns) * 1e-9 * rate_hz + 1e-6)
+        stream = GridStream(found, Grid(0, rate_hz, 0, last))
+        for piece in pieces:
+            stream.add(stamps[piece], values[piece])
+        stream.finish()
+        out[name] = stream.take(last + 1)
+        named = replace(found, topic="uneven stamps")
+        sentences.append(named.sentence.rstrip("."))
+    return out, tuple(sentences)
+
+
+def _by_lines(
+    path: Path,
+    stamps: np.ndarray,
+    signals: Mapping[str, np.ndarray],
+    rate_hz: float,
+    why: str,
+) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
+    """Join the samples by straight lines; each sample left out in turn shows the error."""
+    grid = (
+        stamps[0] + np.arange(math.floor((stamps[-1] - stamps[0]) * rate_hz + 1e-6) + 1) / rate_hz
+    )
+    before, here, after = stamps[:-2], stamps[1:-1], stamps[2:]
+    share = (here - before) / (after - before)
+    out, errors = {}, []
+    for name, values in signals.items():
+        left_out = values[:-2] + share * (values[2:] - values[:-2]) - values[1:-1]
+        error, rms = float(np.sqrt(np.mean(left_out**2))), float(np.std(values))
+        relative = error / rms if rms else 0.0
+        if name == "position" and relative > GREATEST_ERROR:
+            raise InputError(
+                f"{why.rstrip('.')}; nor do straight lines between the samples do: their error is "
+                f"{relative:.0%} of the position's rms."
+            )
+        out[name] = np.interp(grid, stamps, values)
+        errors.append(f"{name} {relative:.2g}")
+    return out, (
+        "its stamps follow no clock, so the samples are joined by straight lines; a sample that is "
+        f"left out is met to this part of the signal's rms: {', '.join(errors)}",
+    )

@@ -1,0 +1,83 @@
+"""The table of effects that the bare plant lacks: one entry for each, and nothing said elsewhere.
+
+An entry (`entry.Effect`) holds identifier, law, parameters with unit, bounds and source, what the
+effect acts on, starts of fits, near and exact equivalents, and telltale. Node parameters, parameter
+files, fits, documents and reports all read it. To add an effect, add its entry to `friction`,
+`transmission` or `drive` and write its law (`plant.torques` or `simulation.rig`), where
+`fx.EFFECT_PARAMETER`, in capitals, is the place of a parameter among the coefficients.
+
+An effect is off while its sizes have their defaults; then the plant is the bare one, bit for bit.
+Parameter names in files and in ROS are `effect.parameter`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from .drive import DRIVE, ENCODER
+from .entry import Effect, EffectParameter
+from .friction import FRICTION
+from .transmission import TRANSMISSION
+
+__all__ = [
+    "CATALOGUE",
+    "DEFAULTS",
+    "EFFECTS",
+    "NAMES",
+    "PARAMETERS",
+    "Effect",
+    "EffectParameter",
+    "coefficients",
+    "near_equivalents",
+    "parameter",
+]
+
+CATALOGUE: tuple[Effect, ...] = (*FRICTION, *TRANSMISSION, *DRIVE, *ENCODER)
+"""All effects."""
+
+EFFECTS: dict[str, Effect] = {effect.identifier: effect for effect in CATALOGUE}
+
+PARAMETERS: tuple[EffectParameter, ...] = tuple(
+    parameter for effect in CATALOGUE for parameter in effect.full_parameters
+)
+"""The parameters of all effects under their full names."""
+
+NAMES: tuple[str, ...] = tuple(parameter.name for parameter in PARAMETERS)
+DEFAULTS: tuple[float, ...] = tuple(float(parameter.default) for parameter in PARAMETERS)
+
+_BY_NAME = {parameter.name: parameter for parameter in PARAMETERS}
+_PLACES = {name.upper().replace(".", "_"): place for place, name in enumerate(NAMES)}
+_SIZES = tuple(NAMES.index(name) for effect in CATALOGUE for name in effect.size_names)
+
+
+def __getattr__(name: str) -> int:
+    """Return where a parameter stands among the coefficients: EFFECT_PARAMETER, in capitals."""
+    try:
+        return _PLACES[name]
+    except KeyError:
+        raise AttributeError(f"the table of effects has no parameter {name}") from None
+
+
+def parameter(name: str) -> EffectParameter:
+    """Return a parameter by its full name, `effect.parameter`."""
+    return _BY_NAME[name]
+
+
+def near_equivalents(identifier: str) -> frozenset[str]:
+    """Return the effects that a motor-side encoder can hardly tell from one, without it."""
+    family = EFFECTS[identifier].looks_like
+    return frozenset(e.identifier for e in CATALOGUE if family and e.looks_like == family) - {
+        identifier
+    }
+
+
+def coefficients(values: Mapping[str, Any]) -> tuple[float, ...] | None:
+    """Return the effects' parameters in the order of `NAMES`; None if all are off.
+
+    Args:
+        values: checked parameter values by full name; missing ones have their defaults.
+    """
+    given = tuple(float(values.get(p.name, p.default)) for p in PARAMETERS)
+    on = any(given[place] != DEFAULTS[place] for place in _SIZES)
+    return given if on else None

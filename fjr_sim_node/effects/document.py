@@ -1,0 +1,68 @@
+"""The catalogue of effects as a Markdown table: `python -m fjr_sim_node.effects.document`.
+
+`python -m fjr_sim_node.effects.document docs/effects.md` puts it between the document's marks.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from pathlib import Path
+
+from fjr_interface.parameters import Value
+
+from . import CATALOGUE, Effect, EffectParameter
+
+BEGIN, END = "<!-- catalogue: begin -->", "<!-- catalogue: end -->"
+
+
+def table() -> str:
+    """Return how many effects there are, and the table of all and their parameters."""
+    lines = [
+        f"The catalogue holds {len(CATALOGUE)} effects.",
+        "",
+        "| effect and parameters | unit | default | range | what it is |",
+        "|---|---|---|---|---|",
+    ]
+    for effect in CATALOGUE:
+        lines.append(_effect_row(effect))
+        lines += [_parameter_row(parameter) for parameter in effect.parameters]
+    return "\n".join(lines)
+
+
+def _effect_row(effect: Effect) -> str:
+    same = f" Equals {effect.same_as}." if effect.same_as else ""
+    return (
+        f"| **`{effect.identifier}`** | | | | {effect.summary} *Acts on: {effect.acts_on}. "
+        f"Telltale: {effect.telltale}.{same}* Source: {effect.source}. |"
+    )
+
+
+def _parameter_row(parameter: EffectParameter) -> str:
+    name = f"`.{parameter.name}`" + (" (size)" if parameter.role in ("size", "limit") else "")
+    bounds = f"{_number(parameter.low)} to {_number(parameter.high)}"
+    return (
+        f"| {name} | {parameter.unit} | {_number(parameter.default)} | {bounds} "
+        f"| {parameter.description} |"
+    )
+
+
+def _number(value: Value) -> str:
+    return "infinity" if value == math.inf else f"{value:g}"
+
+
+def in_step(document: str) -> str:
+    """Return a document with the present table between its marks."""
+    before, begin, rest = document.partition(BEGIN)
+    _, end, after = rest.partition(END)
+    if not begin or not end:
+        raise ValueError(f"the document lacks the marks {BEGIN} and {END}")
+    return f"{before}{BEGIN}\n\n{table()}\n\n{END}{after}"
+
+
+if __name__ == "__main__":
+    if len(sys.argv) > 1:
+        path = Path(sys.argv[1])
+        path.write_text(in_step(path.read_text(encoding="utf-8")), encoding="utf-8")
+    else:
+        print(table())

@@ -1,0 +1,113 @@
+"""The table of effects: drive and encoder."""
+
+from __future__ import annotations
+
+import math
+
+from .entry import QUARTERS, Effect, EffectParameter, angle, ripple, ripple_starts, size
+
+_SHARES = (0.15, 0.25, 0.4, 0.5, 0.6, 0.7, 0.75, 0.8, 0.85, 0.9, 0.94, 0.97, 1.0, 1.04, 1.1)
+"""Torque limits over the greatest commanded torque: which peaks are clipped changes from one to
+the next, and a knee is felt below its limit."""
+
+DRIVE: tuple[Effect, ...] = (
+    Effect(
+        "torque_bias",
+        "A constant torque adds to the commanded one.",
+        "drive",
+        "plant.torques:motor_drive",
+        "DC only",
+        "drive offset",
+        (size("torque_nm", "N m", "Constant torque", -1e4),),
+        ({"torque_nm": (0.3,)},),
+        looks_like="constant torque",
+    ),
+    Effect(
+        "cogging",
+        "The motor torque ripples with the motor angle.",
+        "drive",
+        "plant.torques:motor_drive",
+        "even lines, falling with amplitude",
+        "Petrovic et al. 2000, IEEE Trans. Control Systems Technology 8(6)",
+        ripple("amplitude_nm", "N m", 1e4, "the torque ripple"),
+        ripple_starts("amplitude_nm", 0.3),
+        looks_like="constant torque",
+        ripple=True,
+    ),
+    Effect(
+        "delay",
+        "The torque acts later than commanded.",
+        "drive",
+        "simulation.rig:hold",
+        "phase, growing with frequency",
+        "transport delay of bus and drive",
+        (size("time_s", "s", "Transport delay", 0.0, 0.01, fit=(0.0, 2e-3)),),
+        ({"time_s": (1e-4, 5e-4)},),
+        looks_like="late torque",
+    ),
+    Effect(
+        "actuator_lag",
+        "The current loop follows the commanded torque with finite bandwidth.",
+        "drive",
+        "simulation.rig:hold",
+        "phase as delay, gain falls too",
+        "first-order current loop",
+        (size("time_constant_s", "s", "Time constant", 0.0, 0.1, negligible=5e-6,
+              fit=(0.0, 5e-3)),),
+        ({"time_constant_s": (1e-4, 5e-4)},),
+        looks_like="late torque",
+    ),
+    Effect(
+        "torque_saturation",
+        "The drive clips the torque.",
+        "drive",
+        "simulation.rig:limited",
+        "highest amplitude only",
+        "drive limit; the knee as a motor's iron saturates",
+        (
+            EffectParameter("limit_nm", math.inf, "N m", "Greatest torque; .inf: no limit", 1e-6,
+                            role="limit"),
+            EffectParameter("knee", 0.0, "", "Share of the limit over which it bends", 0.0, 1.0),
+        ),
+        ({"limit_nm": _SHARES, "knee": (0.1,)},),
+    ),
+    Effect(
+        "torque_gain",
+        "The torque constant is not the one assumed.",
+        "drive",
+        "simulation.rig:hold",
+        "exactly equivalent to scaling all parameters",
+        "torque-constant error",
+        (size("relative_error", "", "Torque beyond the commanded one, relative", -0.9, 10.0),),
+        ({"relative_error": (0.05,)},),
+        same_as="all parameters of the bare plant scaled by one factor",
+        scales=True,
+    ),
+)  # fmt: skip
+
+ENCODER: tuple[Effect, ...] = (
+    Effect(
+        "encoder_quantization",
+        "The encoder counts in steps.",
+        "encoder",
+        "simulation.rig:measure",
+        "noise-like",
+        "uniform quantiser",
+        (size("resolution_rad", "rad", "One count", 0.0, 1.0),),
+        ({"resolution_rad": (1e-4, 5e-4)},),
+    ),
+    Effect(
+        "encoder_eccentricity",
+        "The encoder disc is off centre.",
+        "encoder",
+        "simulation.rig:measure",
+        "nearly invisible",
+        "once-per-turn measurement error",
+        (
+            size("amplitude_rad", "rad", "Amplitude of the angle error", 0.0, 0.5),
+            angle("phase_rad", "Phase at angle zero"),
+        ),
+        ({"amplitude_rad": (1e-3, 3e-2), "phase_rad": QUARTERS},),
+        scales=True,
+    ),
+)

@@ -1,0 +1,125 @@
+"""The table of effects: friction of motor and link."""
+
+from __future__ import annotations
+
+from .entry import Effect, EffectParameter, ripple, ripple_starts, size
+
+_STRIBECK_STARTS = ({"torque_nm": (0.3, 2.0), "velocity_rad_s": (0.02, 0.1, 0.5)},)
+_ARMSTRONG = "Armstrong-Helouvry, Dupont, Canudas de Wit 1994, Automatica 30(7)"
+
+
+def _stribeck(side: str) -> tuple[EffectParameter, ...]:
+    return (
+        size("torque_nm", "N m", f"Breakaway above Coulomb friction, {side} side"),
+        EffectParameter(
+            "velocity_rad_s", 0.1, "rad/s", "Stribeck velocity, where it has fallen to 1/e",
+            1e-4, 100.0, fit=(0.01, 5.0),
+        ),
+    )  # fmt: skip
+
+
+FRICTION: tuple[Effect, ...] = (
+    Effect(
+        "stribeck_friction_motor",
+        "Motor friction is higher at breakaway and falls with velocity.",
+        "motor",
+        "plant.torques:motor_level",
+        "low amplitude only",
+        _ARMSTRONG,
+        _stribeck("motor"),
+        _STRIBECK_STARTS,
+    ),
+    Effect(
+        "stribeck_friction_link",
+        "Link friction is higher at breakaway and falls with velocity.",
+        "link",
+        "plant.torques:link_level",
+        "low amplitude only",
+        _ARMSTRONG,
+        _stribeck("link"),
+        _STRIBECK_STARTS,
+    ),
+    Effect(
+        "asymmetric_friction",
+        "Motor friction depends on the direction of motion.",
+        "motor",
+        "plant.torques:motor_level",
+        "DC; even lines if viscous",
+        "Swevers et al. 1997, IEEE Trans. Robotics and Automation 13(5)",
+        (
+            size("coulomb_nm", "N m", "Half the difference of Coulomb friction between the "
+                 "directions", -1e4),
+            size("viscous_nm_s_rad", "N m s/rad", "Half the difference of viscous friction between "
+                 "the directions", -1e4),
+        ),
+        (
+            {"coulomb_nm": (0.3,), "viscous_nm_s_rad": (0.0,)},
+            {"coulomb_nm": (0.0,), "viscous_nm_s_rad": (0.2,)},
+        ),
+        looks_like="constant torque",
+        same_as="a torque bias while the motor slides, where only Coulomb friction differs",
+    ),
+    Effect(
+        "presliding_friction",
+        "Friction builds up over a small displacement before sliding, as a stiff spring does.",
+        "motor",
+        "plant.torques:build_up",
+        "low amplitude, phase lead at the resonance",
+        "Dahl 1968, TOR-158(3107-18); de Wit et al. 1995, IEEE TAC 40(3), without bristle damping",
+        (
+            size("motor_rad", "rad", "Displacement over which motor friction builds up", 0.0, 1.0,
+                 negligible=2e-6),
+            size("link_rad", "rad", "Displacement over which link friction builds up", 0.0, 1.0,
+                 negligible=2e-6, of_link=True),
+        ),
+        # A side that starts below what is negligible never leaves it.
+        ({"motor_rad": (2e-5, 2e-4, 2e-3), "link_rad": (2e-5, 2e-4, 2e-3)},),
+    ),
+    Effect(
+        "load_friction",
+        "Motor Coulomb friction grows with the transmitted torque.",
+        "transmission",
+        "plant.torques:motor_level",
+        "resonance lower at all amplitudes",
+        "Hamon, Gautier, Garrec 2010, IROS, load-dependent gear friction",
+        (size("coefficient", "", "Friction per transmitted torque", 0.0, 0.95, fit=(0.0, 0.5)),),
+        ({"coefficient": (0.01, 0.05)},),
+    ),
+    Effect(
+        "position_friction",
+        "Motor Coulomb friction varies with the motor angle.",
+        "motor",
+        "plant.torques:motor_level",
+        "even lines, small gain",
+        "Armstrong 1988, position-dependent friction of geared joints",
+        ripple("amplitude_nm", "N m", 1e4, "the variation of Coulomb friction"),
+        ripple_starts("amplitude_nm", 0.3),
+        ripple=True,
+    ),
+    Effect(
+        "quadratic_friction",
+        "Drag grows with the square of velocity.",
+        "motor",
+        "plant.torques:motor_viscous",
+        "grows with amplitude",
+        "fluid and lubricant drag, sgn(v) v^2",
+        (
+            size("motor_nm_s2_rad2", "N m s2/rad2", "Drag on the motor"),
+            size("link_nm_s2_rad2", "N m s2/rad2", "Drag on the link", of_link=True),
+        ),
+        (
+            {"motor_nm_s2_rad2": (0.05,), "link_nm_s2_rad2": (0.0,)},
+            {"motor_nm_s2_rad2": (0.0,), "link_nm_s2_rad2": (0.05,)},
+        ),
+    ),
+    Effect(
+        "nonstationary",
+        "Coulomb and viscous friction drift with time, as they do while a gear warms up.",
+        "time",
+        "simulation.rig:hold",
+        "change between periods and realizations",
+        "relative drift, linear in time over the whole experiment",
+        (size("friction_per_s", "1/s", "Relative change of Coulomb and viscous friction per "
+              "second", -0.1, 0.1),),
+    ),
+)  # fmt: skip

@@ -1,0 +1,114 @@
+"""The table of effects: transmission and link, which a rigid axis does not have."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .entry import Effect, EffectParameter, angle, ripple, ripple_starts, size
+
+_MODES_HZ = tuple(np.geomspace(4.0, 100.0, 44).tolist())
+"""Frequencies of a light third mass, which shows in a band as narrow as its damping."""
+
+TRANSMISSION: tuple[Effect, ...] = (
+    Effect(
+        "backlash",
+        "The transmission has a dead zone.",
+        "transmission",
+        "plant.torques:spring_torque",
+        "low amplitude, more gain at 2-13 Hz",
+        "Nordin, Gutman 2002, Automatica 38(10), dead-zone model",
+        (size("half_gap_rad", "rad", "Half the dead zone of the deflection", 0.0, 1.0),),
+        ({"half_gap_rad": (2e-4, 1e-3, 4e-3)},),
+        looks_like="dead or soft zone",
+        same_as="a soft zone of zero stiffness (piecewise_stiffness with soft_ratio 0)",
+    ),
+    Effect(
+        "piecewise_stiffness",
+        "The transmission is soft around zero deflection and stiffer beyond (strain-wave gear).",
+        "transmission",
+        "plant.torques:spring_torque",
+        "near backlash, which it contains",
+        "Spong 1987; manufacturers' three-slope stiffness of strain-wave gears",
+        (
+            size("zone_rad", "rad", "Half width of the soft zone", 0.0, 1.0),
+            EffectParameter("soft_ratio", 0.5, "", "Stiffness in the soft zone over k0", 0.0, 1.0),
+        ),
+        ({"zone_rad": (1e-3, 4e-3, 2e-2, 6e-2), "soft_ratio": (0.4, 0.9)},),
+        looks_like="dead or soft zone",
+    ),
+    Effect(
+        "hysteresis",
+        "The transmission torque depends on the history of the deflection.",
+        "transmission",
+        "plant.torques:transmitted_torque",
+        "antiresonance damped",
+        "Dahl 1968 on the deflection; the rate-independent Bouc-Wen model with n = 1",
+        (
+            size("torque_nm", "N m", "Half height of the hysteresis loop"),
+            EffectParameter("displacement_rad", 1e-3, "rad", "Deflection over which it builds up",
+                            1e-6, 1.0, fit=(5e-5, 0.3)),
+        ),
+        ({"torque_nm": (0.5, 4.0), "displacement_rad": (3e-4, 3e-3, 2e-2)},),
+        looks_like="loss in the transmission",
+    ),
+    Effect(
+        "transmission_damping",
+        "The transmission has a viscous term.",
+        "transmission",
+        "plant.torques:transmitted_torque",
+        "resonance damped at mid and high amplitude",
+        "Spong 1987, ASME J. Dyn. Syst. 109(4), with joint damping",
+        (size("nm_s_rad", "N m s/rad", "Torque per deflection velocity"),),
+        ({"nm_s_rad": (0.1, 1.0)},),
+        looks_like="loss in the transmission",
+    ),
+    Effect(
+        "kinematic_error",
+        "The gear transmits an angle that is off periodically with the motor angle.",
+        "transmission",
+        "plant.torques:deflection",
+        "even lines, flat with amplitude",
+        "Tuttle, Seering 1996, IEEE Trans. Robotics and Automation 12(3)",
+        ripple("amplitude_rad", "rad", 1.0, "the angle error"),
+        ripple_starts("amplitude_rad", 3e-4),
+        ripple=True,
+    ),
+    Effect(
+        "extra_mode",
+        "A third mass hangs on the link behind a spring of its own.",
+        "link",
+        "plant.torques:link_drive",
+        "narrow band",
+        "three-mass model of a flexible joint with a flexible link",
+        (
+            size("inertia_kg_m2", "kg m2", "Inertia of the third mass", 0.0, 1e3),
+            EffectParameter("frequency_hz", 30.0, "Hz", "Its natural frequency with the link held",
+                            0.1, 2000.0, fit=(2.0, 120.0)),
+            EffectParameter("damping_ratio", 0.02, "", "Its damping ratio with the link held",
+                            0.0, 2.0, fit=(0.0, 0.5)),
+        ),
+        (
+            {"inertia_kg_m2": (1e-3,), "frequency_hz": _MODES_HZ, "damping_ratio": (0.03,)},
+            {
+                "inertia_kg_m2": (2e-2,),
+                "frequency_hz": (8.0, 15.0, 22.0, 30.0, 40.0, 55.0),
+                "damping_ratio": (0.03,),
+            },
+        ),
+    ),
+    Effect(
+        "gravity",
+        "The link is out of balance.",
+        "link",
+        "plant.torques:link_drive",
+        "DC and even lines at low amplitude",
+        "pendulum torque m g l sin(q + angle)",
+        (
+            size("torque_nm", "N m", "Greatest gravity torque m g l"),
+            angle("angle_rad", "Angle of the link from hanging down at q = 0"),
+        ),
+        ({"torque_nm": (0.5, 4.0), "angle_rad": (0.0, np.pi / 2, np.pi)},),
+        looks_like="constant torque",
+        same_as="cogging of one cycle per turn, on a rigid axis",
+    ),
+)  # fmt: skip

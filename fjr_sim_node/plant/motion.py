@@ -1,0 +1,155 @@
+"""Smooth motion of the plant between events: torques on each side, one Runge-Kutta step.
+
+In this module, in `stick_slip` and in `plant`
+    s = (q, vq, th, vth, q3, v3, lagged torque), the last three at rest without effects;
+    m = (link, motor, flex, region): slip directions, 0 while a side sticks, direction in which the
+        deflection changes, smooth part of the spring that it is in;
+    w = what has built up where the present motion began, and where that was: presliding torque of
+        link and motor (N m), state of the hysteresis, q, th, deflection, Coulomb level of link and
+        motor in its direction (N m); unused without effects;
+    p and e are parameters as in `torques`.
+"""
+
+from __future__ import annotations
+
+import math
+
+from fjr_kit.compiled import inlined, jit
+
+from .. import effects as fx
+from .presliding import bristle_torque
+from .torques import (
+    FS,
+    FSM,
+    JM,
+    LINK_BRISTLES,
+    MOTOR_BRISTLES,
+    J,
+    build_up,
+    deflection,
+    link_drive,
+    link_level,
+    link_viscous,
+    motor_drive,
+    motor_level,
+    motor_viscous,
+    transmitted_torque,
+)
+
+
+@inlined
+def flex_state(s, m, w, e):
+    """Return the present state of the hysteresis in [-1, 1]."""
+    if e is None:
+        return 0.0
+    if e[fx.HYSTERESIS_TORQUE_NM] == 0.0:
+        return 0.0
+    return build_up(w[2], m[2], deflection(s[0], s[2], e) - w[5], e[fx.HYSTERESIS_DISPLACEMENT_RAD])
+
+
+@inlined
+def transmitted(s, m, w, p, e):
+    """Return the torque of the transmission on the motor (N m)."""
+    return transmitted_torque(s[0], s[1], s[2], s[3], flex_state(s, m, w, e), p, e)
+
+
+@inlined
+def link_friction(s, m, w, p, e):
+    """Return Coulomb friction of the link (N m): its level, or what has built up of it."""
+    if e is None:
+        return p[FS] * m[0]
+    level = link_level(abs(s[1]), p, e)
+    if p[LINK_BRISTLES] == 0.0:
+        return level * m[0]
+    return bristle_torque(w[0], w[6], level, m[0], s[0] - w[3], p[LINK_BRISTLES])
+
+
+@inlined
+def motor_friction(s, te, m, w, p, e):
+    """Return Coulomb friction of the motor (N m)."""
+    if e is None:
+        return p[FSM] * m[1]
+    level = motor_level(abs(s[3]), m[1], s[2], te, p, e)
+    if p[MOTOR_BRISTLES] == 0.0:
+        return level * m[1]
+    return bristle_torque(w[1], w[7], level, m[1], s[2] - w[4], p[MOTOR_BRISTLES])
+
+
+@inlined
+def link_torque(s, te, p, e):
+    """Return the torque that drives the link against its Coulomb friction."""
+    if e is None:
+        return link_drive(s[0], s[1], te, 0.0, 0.0, p, e)
+    return link_drive(s[0], s[1], te, s[4], s[5], p, e)
+
+
+@inlined
+def motor_torque(s, te, torque, e):
+    """Return the torque that drives the motor against its Coulomb friction."""
+    if e is None:
+        return motor_drive(s[2], te, torque, e)
+    if e[fx.ACTUATOR_LAG_TIME_CONSTANT_S] != 0.0:
+        torque = s[6]
+    return motor_drive(s[2], te, torque, e)
+
+
+@inlined
+def derivative(s, torque, m, w, p, e):
+    """Return the time derivative of s for given slip directions."""
+    te = transmitted(s, m, w, p, e)
+    aq = 0.0
+    ath = 0.0
+    if m[0] != 0.0:
+        friction = link_viscous(s[1], p, e) + link_friction(s, m, w, p, e)
+        aq = (link_torque(s, te, p, e) - friction) / p[J]
+    if m[1] != 0.0:
+        friction = motor_viscous(s[3], p, e) + motor_friction(s, te, m, w, p, e)
+        ath = (motor_torque(s, te, torque, e) - friction) / p[JM]
+    if e is None:
+        return s[1], aq, s[3], ath, 0.0, 0.0, 0.0
+    a3 = 0.0
+    if e[fx.EXTRA_MODE_INERTIA_KG_M2] != 0.0:
+        rate = 2.0 * math.pi * e[fx.EXTRA_MODE_FREQUENCY_HZ]
+        a3 = rate * rate * (s[0] - s[4]) + 2.0 * e[fx.EXTRA_MODE_DAMPING_RATIO] * rate * (
+            s[1] - s[5]
+        )
+    lag = 0.0
+    if e[fx.ACTUATOR_LAG_TIME_CONSTANT_S] != 0.0:
+        lag = (torque - s[6]) / e[fx.ACTUATOR_LAG_TIME_CONSTANT_S]
+    return s[1], aq, s[3], ath, s[5], a3, lag
+
+
+@inlined
+def moved(s, h, d, e):
+    """Return s + h d."""
+    if e is None:
+        return (
+            s[0] + h * d[0],
+            s[1] + h * d[1],
+            s[2] + h * d[2],
+            s[3] + h * d[3],
+            0.0,
+            0.0,
+            0.0,
+        )
+    return (
+        s[0] + h * d[0],
+        s[1] + h * d[1],
+        s[2] + h * d[2],
+        s[3] + h * d[3],
+        s[4] + h * d[4],
+        s[5] + h * d[5],
+        s[6] + h * d[6],
+    )
+
+
+@jit
+def runge_kutta(s, torque, m, w, h, p, e):
+    """Return the state after h seconds of smooth motion in given slip directions."""
+    d1 = derivative(s, torque, m, w, p, e)
+    d2 = derivative(moved(s, 0.5 * h, d1, e), torque, m, w, p, e)
+    d3 = derivative(moved(s, 0.5 * h, d2, e), torque, m, w, p, e)
+    d4 = derivative(moved(s, h, d3, e), torque, m, w, p, e)
+    # sum the stages as (d1 + 2 (d2 + d3)) + d4, component by component
+    slope = moved(moved(d1, 2.0, moved(d2, 1.0, d3, e), e), 1.0, d4, e)
+    return moved(s, h / 6.0, slope, e)

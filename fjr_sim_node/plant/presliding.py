@@ -1,0 +1,75 @@
+"""Presliding friction: bristles that store energy and slip, never giving more than they took.
+
+Dahl's law with the torque F as the state, and the Coulomb level L of the moment:
+
+    dF = sigma (dx - |dx| F / L)
+
+The bristles hold F^2 / (2 sigma), and F dx less what they gain is |dx| F^2 / L >= 0. So the law
+takes energy whatever L does along the way, for sigma never changes: L may depend on velocity,
+direction, angle and load. `p` and `e` are parameters as in `torques`.
+"""
+
+from __future__ import annotations
+
+import math
+
+from fjr_kit.compiled import inlined
+
+from .. import effects as fx
+from .torques import FS, FSM, FV, FVM, JM, K0, K1, J, motor_level_bound
+
+
+@inlined
+def with_bristles(p, factor, e):
+    """Return the bare parameters, friction times a factor, then the bristles' stiffnesses.
+
+    Stiffness (N m/rad) is the highest level without load and drift over the displacement. It is 0,
+    which is Coulomb friction at once, without presliding and where all friction is that of load.
+    """
+    link, motor = 0.0, 0.0
+    if e[fx.PRESLIDING_FRICTION_LINK_RAD] != 0.0:
+        link = (p[FS] + e[fx.STRIBECK_FRICTION_LINK_TORQUE_NM]) / e[fx.PRESLIDING_FRICTION_LINK_RAD]
+    if e[fx.PRESLIDING_FRICTION_MOTOR_RAD] != 0.0:
+        motor = motor_level_bound(0.0, p, e) / e[fx.PRESLIDING_FRICTION_MOTOR_RAD]
+    return (
+        p[JM],
+        p[J],
+        factor * p[FS],
+        factor * p[FSM],
+        factor * p[FV],
+        factor * p[FVM],
+        p[K0],
+        p[K1],
+        link,
+        motor,
+    )
+
+
+@inlined
+def bristle_torque(before, level_before, level, direction, moved, stiffness):
+    """Return F after a motion of one direction (N m).
+
+    It solves the law exactly for a level that is linear along the path, but for a mean level in
+    the rate; for a constant level exactly.
+
+    Args:
+        before: F at the start of the motion (N m).
+        level_before: level at the start, for this direction (N m).
+        level: level now (N m).
+        direction: direction of the motion, +-1.
+        moved: displacement since then, of that direction (rad).
+        stiffness: sigma (N m/rad).
+    """
+    if moved == 0.0:
+        return before
+    between = 0.5 * (level_before + level)
+    if between == 0.0:
+        return 0.0
+    phase = stiffness * abs(moved) / between
+    if phase == 0.0:
+        return before
+    if level == level_before:
+        return direction * level + (before - direction * level) * math.exp(-phase)
+    faded = -math.expm1(-phase)
+    start = before - direction * level_before
+    return before + direction * (level - level_before) * (1.0 - faded / phase) - start * faded

@@ -1,0 +1,166 @@
+"""Bounds on the plant's motion within a hold, by which its integration step is chosen.
+
+`s` and `w` are as in `motion`, `p` and `e` are parameters as in `torques`.
+"""
+
+from __future__ import annotations
+
+import math
+
+from fjr_kit.compiled import inlined, jit
+
+from .. import effects as fx
+from .torques import (
+    FS,
+    FV,
+    FVM,
+    JM,
+    K0,
+    K1,
+    LINK_BRISTLES,
+    MOTOR_BRISTLES,
+    J,
+    deflection,
+    deflection_speed,
+    motor_level_bound,
+)
+
+
+@inlined
+def pushes(s, torque, w, p, e):
+    """Return the greatest torques that may feed energy to link and motor (N m)."""
+    if e is None:
+        return 0.0, abs(torque)
+    motor = (
+        max(abs(torque), abs(s[6])) + abs(e[fx.TORQUE_BIAS_TORQUE_NM]) + e[fx.HYSTERESIS_TORQUE_NM]
+    )
+    motor += e[fx.COGGING_AMPLITUDE_NM] * (1.0 + e[fx.COGGING_SECOND_RATIO])
+    if p[MOTOR_BRISTLES] != 0.0:
+        motor += max(abs(w[1]), motor_level_bound(0.0, p, e))
+    link = e[fx.GRAVITY_TORQUE_NM] + e[fx.HYSTERESIS_TORQUE_NM]
+    if p[LINK_BRISTLES] != 0.0:
+        link += max(abs(w[0]), p[FS] + e[fx.STRIBECK_FRICTION_LINK_TORQUE_NM])
+    if e[fx.EXTRA_MODE_INERTIA_KG_M2] != 0.0:
+        rate = 2.0 * math.pi * e[fx.EXTRA_MODE_FREQUENCY_HZ]
+        pull = rate * abs(s[4] - s[0]) + 2.0 * e[fx.EXTRA_MODE_DAMPING_RATIO] * abs(s[5] - s[1])
+        link += e[fx.EXTRA_MODE_INERTIA_KG_M2] * rate * pull
+    return link, motor
+
+
+@inlined
+def reach(s, link, motor, duration, p, e):
+    """Return the greatest deflection that free flight under these torques would reach (rad)."""
+    speed = abs(deflection_speed(s[1], s[2], s[3], e))
+    acceleration = motor / p[JM]
+    if e is not None:
+        acceleration += link / p[J]
+    return abs(deflection(s[0], s[2], e)) + duration * (speed + 0.5 * duration * acceleration)
+
+
+@jit
+def reach_within_energy(s, link, motor, duration, p, e):
+    """Return the greatest deflection that the energy E allows (rad).
+
+    Friction only takes energy, and dE/dt <= motor sqrt(2 E / Jm) + link sqrt(2 E / J); the
+    deflection follows from te's potential. A soft zone lowers that by a ramp of its own width.
+    """
+    twist2 = deflection(s[0], s[2], e) ** 2
+    kinetic = p[J] * s[1] * s[1] + p[JM] * s[3] * s[3]
+    energy = 0.5 * (kinetic + (p[K0] + 0.5 * p[K1] * twist2) * twist2)
+    root = motor / math.sqrt(2.0 * p[JM]) + link / math.sqrt(2.0 * p[J])
+    slack = 0.0
+    if e is not None:
+        slack = e[fx.BACKLASH_HALF_GAP_RAD] + e[fx.PIECEWISE_STIFFNESS_ZONE_RAD]
+        rate = 2.0 * math.pi * e[fx.EXTRA_MODE_FREQUENCY_HZ]
+        swing = rate * (s[4] - s[0])
+        energy += 0.5 * e[fx.EXTRA_MODE_INERTIA_KG_M2] * (s[5] * s[5] + swing * swing)
+    root = math.sqrt(energy) + duration * root
+    peak = math.sqrt(p[K0] * p[K0] + 4.0 * p[K1] * root * root)
+    if p[K1] > 0.0:
+        return slack + math.sqrt(max(peak - p[K0], 0.0) / p[K1])
+    return slack + root * math.sqrt(2.0 / p[K0]) if p[K0] > 0.0 else math.inf
+
+
+@inlined
+def fastest_rate(twist, s, p, e):
+    """Return in rad/s how fast the motion may oscillate or decay up to a deflection.
+
+    The squared frequency is bounded by the sum over all springs of stiffness times mobility.
+    """
+    stiffness = p[K0] + 3.0 * p[K1] * twist * twist
+    decay = p[FV] / p[J] + p[FVM] / p[JM]
+    if e is None:
+        return math.sqrt(stiffness * (1.0 / p[J] + 1.0 / p[JM])) + decay
+    return _fastest_rate(stiffness, twist, decay, s, p, e)
+
+
+@jit
+def _fastest_rate(stiffness, twist, decay, s, p, e):
+    te = stiffness * twist
+    if e[fx.HYSTERESIS_TORQUE_NM] != 0.0:
+        stiffness += e[fx.HYSTERESIS_TORQUE_NM] / e[fx.HYSTERESIS_DISPLACEMENT_RAD]
+    cycles = e[fx.KINEMATIC_ERROR_CYCLES_PER_TURN]
+    slope = (
+        e[fx.KINEMATIC_ERROR_AMPLITUDE_RAD]
+        * cycles
+        * (1.0 + 2.0 * e[fx.KINEMATIC_ERROR_SECOND_RATIO])
+    )
+    bend = (
+        e[fx.KINEMATIC_ERROR_AMPLITUDE_RAD]
+        * cycles
+        * cycles
+        * (1.0 + 4.0 * e[fx.KINEMATIC_ERROR_SECOND_RATIO])
+    )
+    ratio = 1.0 + slope
+    mobility = 1.0 / p[J] + ratio * (ratio + e[fx.LOAD_FRICTION_COEFFICIENT]) / p[JM]
+    link = e[fx.GRAVITY_TORQUE_NM]
+    motor = (
+        e[fx.COGGING_AMPLITUDE_NM]
+        * e[fx.COGGING_CYCLES_PER_TURN]
+        * (1.0 + 2.0 * e[fx.COGGING_SECOND_RATIO])
+        + te * bend
+    )
+    friction = e[fx.POSITION_FRICTION_AMPLITUDE_NM] * e[fx.POSITION_FRICTION_CYCLES_PER_TURN]
+    motor += friction * (1.0 + 2.0 * e[fx.POSITION_FRICTION_SECOND_RATIO])
+    link += p[LINK_BRISTLES]
+    motor += p[MOTOR_BRISTLES]
+    decay += e[fx.TRANSMISSION_DAMPING_NM_S_RAD] * mobility
+    decay += e[fx.STRIBECK_FRICTION_LINK_TORQUE_NM] / (
+        e[fx.STRIBECK_FRICTION_LINK_VELOCITY_RAD_S] * p[J]
+    )
+    decay += e[fx.STRIBECK_FRICTION_MOTOR_TORQUE_NM] / (
+        e[fx.STRIBECK_FRICTION_MOTOR_VELOCITY_RAD_S] * p[JM]
+    )
+    decay += 2.0 * e[fx.QUADRATIC_FRICTION_LINK_NM_S2_RAD2] * abs(s[1]) / p[J]
+    decay += (
+        2.0 * e[fx.QUADRATIC_FRICTION_MOTOR_NM_S2_RAD2] * abs(s[3])
+        + abs(e[fx.ASYMMETRIC_FRICTION_VISCOUS_NM_S_RAD])
+    ) / p[JM]
+    squared = stiffness * mobility + link / p[J] + motor / p[JM]
+    rate = max(math.sqrt(squared) + decay, 0.3 * ripple_rate(s[3], e))
+    if e[fx.EXTRA_MODE_INERTIA_KG_M2] != 0.0:
+        share = 1.0 + e[fx.EXTRA_MODE_INERTIA_KG_M2] / p[J]
+        factor = max(math.sqrt(share), 2.0 * e[fx.EXTRA_MODE_DAMPING_RATIO] * share)
+        rate = max(rate, 2.0 * math.pi * e[fx.EXTRA_MODE_FREQUENCY_HZ] * factor)
+    if e[fx.ACTUATOR_LAG_TIME_CONSTANT_S] != 0.0:
+        rate = max(rate, 0.2 / e[fx.ACTUATOR_LAG_TIME_CONSTANT_S])
+    return rate
+
+
+@inlined
+def _finest(cycles, second):
+    return 2.0 * cycles if second != 0.0 else cycles
+
+
+@inlined
+def ripple_rate(vth, e):
+    """Return how fast the motor passes the finest of the angle-periodic ripples (rad/s)."""
+    cycles = 0.0
+    if e[fx.KINEMATIC_ERROR_AMPLITUDE_RAD] != 0.0:
+        cycles = _finest(e[fx.KINEMATIC_ERROR_CYCLES_PER_TURN], e[fx.KINEMATIC_ERROR_SECOND_RATIO])
+    if e[fx.COGGING_AMPLITUDE_NM] != 0.0:
+        cycles = max(cycles, _finest(e[fx.COGGING_CYCLES_PER_TURN], e[fx.COGGING_SECOND_RATIO]))
+    if e[fx.POSITION_FRICTION_AMPLITUDE_NM] != 0.0:
+        second = e[fx.POSITION_FRICTION_SECOND_RATIO]
+        cycles = max(cycles, _finest(e[fx.POSITION_FRICTION_CYCLES_PER_TURN], second))
+    return cycles * abs(vth)

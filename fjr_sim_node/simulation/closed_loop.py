@@ -1,0 +1,181 @@
+"""Closed-loop batch simulation: the compiled steps of the nodes, without the messages between.
+
+At sample k the encoder gives y = th + noise, the controller answers with u = C(r - y), and u is
+held to the next sample: the lockstep of the graph. A torque may be added to that of the controller:
+with the recorded torque added and the recorded position as the reference, the loop is an observer.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from controller_node import pd_filtered, transfer_function
+from controller_node.transfer_function import Law, TransferFunction
+from fjr_kit.compiled import jit
+from fjr_kit.errors import InputError
+
+from . import rig
+
+_BODIES = 6  # a rig's state begins with positions and velocities of link, motor and extra mass
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Sampled signals of a simulation, float64 of shape (samples,) each.
+
+    Attributes:
+        reference: r (rad).
+        position: y, measured motor position (rad).
+        torque: u (N m).
+        link: q, link position (rad).
+        motor: th, true motor position (rad).
+    """
+
+    reference: np.ndarray
+    position: np.ndarray
+    torque: np.ndarray
+    link: np.ndarray
+    motor: np.ndarray
+
+
+@jit
+def _run(reference, noise, sample_period, p, e, c, state, position, torque, link, motor):
+    x = 0.0
+    for k in range(reference.size):
+        y = rig.measure(state, noise[k], e)
+        x, u = pd_filtered.step(x, reference[k] - y, c)
+        position[k], torque[k], link[k], motor[k] = y, u, state[rig.LINK], state[rig.MOTOR]
+        rig.hold(state, u, sample_period, p, e)
+
+
+@jit
+def _run_law(
+    reference, added, noise, sample_period, substeps, p, e, b, a, limit, state,
+    position, torque, link, motor,
+):  # fmt: skip
+    x = np.zeros(b.size)
+    for k in range(reference.size):
+        y = rig.measure(state, noise[k], e)
+        u = added[k] + transfer_function.step(x, reference[k] - y, b, a, limit)
+        position[k], torque[k], link[k], motor[k] = y, u, state[rig.LINK], state[rig.MOTOR]
+        for _ in range(substeps):
+            rig.hold(state, u, sample_period / substeps, p, e)
+
+
+def simulate(
+    reference: np.ndarray,
+    sample_rate_hz: float,
+    plant_coefficients: tuple[float, ...],
+    controller: Law,
+    noise: np.ndarray | None = None,
+    effects: tuple[float, ...] | None = None,
+    elapsed_s: float = 0.0,
+) -> Trajectory:
+    """Simulate the closed loop from rest.
+
+    Args:
+        reference: r, float64 of shape (samples,) in rad.
+        sample_rate_hz: rate of the samples.
+        plant_coefficients: from `plant.coefficients`.
+        controller: from `pd_filtered.coefficients`, or a transfer function.
+        noise: encoder noise in rad, of shape (samples,); None for none.
+        effects: from `effects.coefficients`; None for the bare plant.
+        elapsed_s: time since the rig was switched on, for what drifts.
+
+    Raises:
+        InputError: the motion diverged.
+    """
+    if isinstance(controller, TransferFunction):
+        return simulate_law(
+            reference, sample_rate_hz, plant_coefficients, controller, noise, effects, elapsed_s
+        )
+    reference, noise, out = _prepared(reference, noise)
+    _run(
+        reference,
+        noise,
+        1.0 / sample_rate_hz,
+        plant_coefficients,
+        effects,
+        controller,
+        rig.at_rest(elapsed_s),
+        out.position,
+        out.torque,
+        out.link,
+        out.motor,
+    )
+    return _finite(out, sample_rate_hz)
+
+
+def simulate_law(
+    reference: np.ndarray,
+    sample_rate_hz: float,
+    plant_coefficients: tuple[float, ...],
+    controller: TransferFunction,
+    noise: np.ndarray | None = None,
+    effects: tuple[float, ...] | None = None,
+    elapsed_s: float = 0.0,
+    *,
+    added_torque: np.ndarray | None = None,
+    start: tuple[float, float] = (0.0, 0.0),
+    substeps: int = 1,
+) -> Trajectory:
+    """Simulate the loop of a transfer function; see `simulate`.
+
+    Args:
+        reference: r, float64 of shape (samples,) in rad.
+        sample_rate_hz: rate of the samples.
+        plant_coefficients: from `plant.coefficients`.
+        controller: the law.
+        noise: encoder noise in rad, of shape (samples,); None for none.
+        effects: from `effects.coefficients`; None for the bare plant.
+        elapsed_s: time since the rig was switched on, for what drifts.
+        added_torque: torque beside the controller's, (samples,) in N m; None for none.
+        start: position (rad) and velocity (rad/s) of all bodies at the first sample.
+        substeps: parts of a sample in which the plant is integrated, at least.
+
+    Raises:
+        InputError: the motion diverged.
+    """
+    reference, noise, out = _prepared(reference, noise)
+    state = rig.at_rest(elapsed_s)
+    state[:_BODIES] = start * (_BODIES // 2)
+    _run_law(
+        reference,
+        np.zeros(reference.size) if added_torque is None else added_torque,
+        noise,
+        1.0 / sample_rate_hz,
+        substeps,
+        plant_coefficients,
+        effects,
+        controller.numerator,
+        controller.denominator,
+        controller.limit_nm,
+        state,
+        out.position,
+        out.torque,
+        out.link,
+        out.motor,
+    )
+    return _finite(out, sample_rate_hz)
+
+
+def _prepared(
+    reference: np.ndarray, noise: np.ndarray | None
+) -> tuple[np.ndarray, np.ndarray, Trajectory]:
+    """Return reference and noise as the kernels take them, and room for the signals."""
+    reference = np.ascontiguousarray(reference, float)
+    noise = np.zeros(reference.size) if noise is None else np.ascontiguousarray(noise, float)
+    return reference, noise, Trajectory(reference, *(np.empty(reference.size) for _ in range(4)))
+
+
+def _finite(out: Trajectory, sample_rate_hz: float) -> Trajectory:
+    """Return the signals; raise InputError if they are not finite."""
+    bad = np.flatnonzero(~np.isfinite(out.position))
+    if bad.size:
+        raise InputError(
+            f"The simulated motion diverges at {bad[0] / sample_rate_hz:.3f} s; raise "
+            "sample_rate_hz or lower the controller gains or the amplitude."
+        )
+    return out

@@ -1,0 +1,101 @@
+"""The simulated rig, one sample at a time: drive, plant, encoder, in one compiled step.
+
+The node and the batch simulation call the same two functions: `measure`, then `hold`.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from fjr_kit.compiled import jit
+
+from .. import effects as fx
+from ..plant import advance, advance_with_effects
+
+LINK, MOTOR = 0, 2
+"""Where link and motor position (rad) stand in a rig's state."""
+
+_TIME, _HEAD, _RING = 10, 11, 12
+_RING_SIZE = 2048
+
+
+def at_rest(elapsed_s: float = 0.0) -> np.ndarray:
+    """Return the state of a rig at rest.
+
+    Args:
+        elapsed_s: time since the rig was switched on, for what drifts.
+    """
+    state = np.zeros(_RING + _RING_SIZE)
+    state[_TIME] = elapsed_s
+    return state
+
+
+@jit
+def measure(x, noise, e):
+    """Return what the encoder reads (rad): the motor position with noise and its own errors."""
+    y = x[MOTOR]
+    if e is None:
+        return y + noise
+    if e[fx.ENCODER_ECCENTRICITY_AMPLITUDE_RAD] != 0.0:
+        y += e[fx.ENCODER_ECCENTRICITY_AMPLITUDE_RAD] * math.sin(
+            y + e[fx.ENCODER_ECCENTRICITY_PHASE_RAD]
+        )
+    y += noise
+    if e[fx.ENCODER_QUANTIZATION_RESOLUTION_RAD] != 0.0:
+        y = e[fx.ENCODER_QUANTIZATION_RESOLUTION_RAD] * np.rint(
+            y / e[fx.ENCODER_QUANTIZATION_RESOLUTION_RAD]
+        )
+    return y
+
+
+@jit
+def limited(command, limit, knee):
+    """Return what the drive gives of a command (N m).
+
+    The torque bends into the limit by a parabola from (1 - knee) to (1 + knee) times the limit; a
+    knee of 0 clips.
+    """
+    if knee == 0.0 or limit == math.inf:
+        return min(max(command, -limit), limit)
+    beyond = abs(command) - (1.0 - knee) * limit
+    if beyond <= 0.0:
+        return command
+    bent = abs(command) - beyond * beyond / (4.0 * knee * limit)
+    return math.copysign(bent if beyond < 2.0 * knee * limit else limit, command)
+
+
+@jit
+def hold(x, command, sample_period, p, e):
+    """Advance the rig in place by one sample period under a held torque command.
+
+    Args:
+        x: state from `at_rest`.
+        command: commanded torque u (N m).
+        sample_period: Ts (s).
+        p: bare parameters, `plant.coefficients`.
+        e: effects, `effects.coefficients`, or None.
+    """
+    if e is None:
+        x[0], x[1], x[2], x[3] = advance(x[0], x[1], x[2], x[3], command, sample_period, p)
+        return
+    torque = limited(command, e[fx.TORQUE_SATURATION_LIMIT_NM], e[fx.TORQUE_SATURATION_KNEE]) * (
+        1.0 + e[fx.TORQUE_GAIN_RELATIVE_ERROR]
+    )
+    friction = max(1.0 + e[fx.NONSTATIONARY_FRICTION_PER_S] * x[_TIME], 0.0)
+    x[_TIME] += sample_period
+    if e[fx.DELAY_TIME_S] == 0.0:
+        advance_with_effects(x, torque, sample_period, p, e, friction)
+        return
+    head = (int(x[_HEAD]) + 1) % _RING_SIZE
+    x[_HEAD] = head
+    x[_RING + head] = torque
+    samples = e[fx.DELAY_TIME_S] / sample_period
+    whole = int(samples + 1e-9)  # a delay of whole samples is that, whatever its last bit
+    before = x[_RING + (head - whole - 1) % _RING_SIZE]
+    now = x[_RING + (head - whole) % _RING_SIZE]
+    late = max(samples - whole, 0.0) * sample_period
+    if late > 0.0:
+        advance_with_effects(x, before, late, p, e, friction)
+    advance_with_effects(x, now, sample_period - late, p, e, friction)

@@ -1,0 +1,102 @@
+"""The simulated rig: plant and encoder parameters, encoder noise, one realization in batch."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from controller_node.transfer_function import law_of
+from excitation_node import multisine
+from fjr_interface.experiment import Experiment
+from fjr_interface.parameters import Parameter, ParameterGroup
+from fjr_kit.errors import InputError
+
+from .. import effects, plant
+from .closed_loop import Trajectory, simulate
+
+SIMULATOR = ParameterGroup(
+    *plant.PLANT,
+    *effects.PARAMETERS,
+    Parameter("sample_rate_hz", 1000.0, "Hz", "Rate of the samples", 100.0, 20_000.0),
+    Parameter("noise_std_rad", 0.0, "rad", "Standard deviation of the encoder noise", 0.0, 10.0),
+    Parameter(
+        "noise_snr_db",
+        math.inf,
+        "dB",
+        "Encoder noise by signal-to-noise ratio: rms of the noise-free position over the kept "
+        "periods to the noise; .inf: none; it excludes noise_std_rad",
+        -40.0,
+    ),
+    Parameter("noise_seed", 1, "", "Seed of the encoder noise", 0, 2**31 - 1),
+)
+"""Parameters of the simulated rig and of all effects, by the names of the node's parameters."""
+
+
+def encoder_noise(values: Mapping[str, Any], experiment: Experiment) -> np.ndarray:
+    """Return the encoder noise of one realization, float64 of shape (samples,), rad.
+
+    White and Gaussian, seeded by noise_seed, level and realization, so that the node and the batch
+    simulation give the same.
+
+    Raises:
+        InputError: both noise parameters are given, or the ratio needs a loop that is not known.
+    """
+    std = _noise_std(values, experiment)
+    if std == 0.0:
+        return np.zeros(experiment.samples)
+    seed = [values["noise_seed"], experiment.level, experiment.realization]
+    return std * np.random.default_rng(seed).standard_normal(experiment.samples)
+
+
+def _noise_std(values: Mapping[str, Any], experiment: Experiment) -> float:
+    ratio, std = values["noise_snr_db"], values["noise_std_rad"]
+    if math.isinf(ratio):
+        return std
+    if std:
+        raise InputError("noise_std_rad and noise_snr_db exclude each other; give one of them.")
+    if experiment.controller is None:
+        raise InputError(
+            "noise_snr_db needs the controller in the experiment description; "
+            "give noise_std_rad instead."
+        )
+    position = _closed_loop(values, experiment, None).position
+    kept = position[experiment.transient_periods * experiment.samples_per_period :]
+    return float(np.sqrt(np.mean(kept**2))) * 10.0 ** (-ratio / 20.0)
+
+
+def _closed_loop(
+    values: Mapping[str, Any], experiment: Experiment, noise: np.ndarray | None
+) -> Trajectory:
+    if experiment.controller is None:
+        raise InputError("experiment description: controller is missing, so the loop is not known.")
+    rate = experiment.sample_rate_hz
+    run = simulate(
+        multisine.reference(experiment),
+        rate,
+        plant.coefficients(values),
+        law_of(experiment.controller, rate),
+        noise,
+        effects.coefficients(values),
+        experiment.elapsed_s,
+    )
+    return run if plant.rigid_sums(values) is None else replace(run, link=run.motor)
+
+
+def run_realization(values: Mapping[str, Any], experiment: Experiment) -> Trajectory:
+    """Simulate one described realization in batch, encoder noise included.
+
+    Args:
+        values: checked SIMULATOR values.
+        experiment: description with controller and phase_seed.
+
+    Returns:
+        The sampled signals, (samples,) each, the transient periods first.
+
+    Raises:
+        InputError: the description doesn't fix the run, or the motion diverges.
+    """
+    return _closed_loop(values, experiment, encoder_noise(values, experiment))

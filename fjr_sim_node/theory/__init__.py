@@ -1,0 +1,1 @@
+"""Theory of the rig: linear dynamics G0, delayed loop, statistical linearisation."""

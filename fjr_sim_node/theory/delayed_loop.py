@@ -1,0 +1,131 @@
+"""The linear loop whose torque acts late: its delay margin, and the bias of the BLA by the delay.
+
+A torque that acts `delay` after the sample instant of the position that it answers is, for a delay
+of m whole samples and a rest d, the exact discretisation
+
+    x[k+1] = Phi x[k] + Gamma_before u[k-m-1] + Gamma_now u[k-m]
+
+where the older torque still holds for d (Astrom, Wittenmark, Computer-Controlled Systems, ch. 3).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from scipy.optimize import brentq
+from scipy.signal import freqz
+
+from controller_node.transfer_function import TransferFunction
+
+from .linear import g0, held_torque, state_space
+
+_MOTOR = 2  # where the motor position stands in the state
+_FREQUENCIES = 4000
+
+
+def _delayed(
+    parameters: Mapping[str, Any], sample_rate_hz: float, delay_s: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
+    """Return Phi (4, 4), Gamma_now (4,), Gamma_before (4,) and the whole samples of the delay."""
+    period = 1.0 / sample_rate_hz
+    whole = int(delay_s / period + 1e-9)
+    rest = max(delay_s - whole * period, 0.0)
+    a, b = state_space(parameters)
+    transition, _ = held_torque(a, b, period)
+    after, now = held_torque(a, b, period - rest)
+    return transition, now, after @ held_torque(a, b, rest)[1], whole
+
+
+def delayed_g0(
+    parameters: Mapping[str, Any],
+    frequency_hz: np.ndarray,
+    sample_rate_hz: float,
+    delays_s: np.ndarray,
+) -> np.ndarray:
+    """Return what a sampled loop measures of G0 when the torque acts late.
+
+    Args:
+        parameters: values of PLANT; viscous friction only.
+        frequency_hz: (F,).
+        sample_rate_hz: rate of the samples.
+        delays_s: delays that occur equally often and independently; the mean response counts,
+            since the plant is linear in the torque.
+
+    Returns:
+        complex (F,) in rad/(N m); with a delay of zero `linear.g0`.
+    """
+    z = np.exp(2j * np.pi * np.asarray(frequency_hz, float) / sample_rate_hz)
+    column = np.zeros((z.size, 4), complex)
+    for delay_s in delays_s:
+        transition, now, before, whole = _delayed(parameters, sample_rate_hz, float(delay_s))
+        column += (now + before / z[:, None]) / z[:, None] ** whole
+    resolvent = z[:, None, None] * np.eye(4) - transition
+    solved = np.linalg.solve(resolvent, column[..., None] / len(delays_s))
+    return solved[:, _MOTOR, 0]
+
+
+def spectral_radius(
+    parameters: Mapping[str, Any], law: TransferFunction, sample_rate_hz: float, delay_s: float
+) -> float:
+    """Return the greatest magnitude of a pole of the closed loop; it is stable below 1."""
+    transition, now, before, whole = _delayed(parameters, sample_rate_hz, delay_s)
+    past, states = whole + 1, law.numerator.size - 1
+    size = 4 + past + states
+    torque = np.zeros(size)  # of this sample, by plant state, past torques and state of the law
+    torque[_MOTOR] = -law.numerator[0]
+    if states:
+        torque[4 + past] = 1.0
+    torques = [torque, *np.eye(size)[4 : 4 + past]]
+    loop = np.zeros((size, size))
+    loop[:4, :4] = transition
+    loop[:4] += np.outer(now, torques[whole]) + np.outer(before, torques[whole + 1])
+    loop[4 : 4 + past] = torques[:past]
+    for i in range(states):
+        row = loop[4 + past + i]
+        row -= law.denominator[i + 1] * torque
+        row[_MOTOR] -= law.numerator[i + 1]
+        if i + 1 < states:
+            row[4 + past + i + 1] += 1.0
+    return float(np.abs(np.linalg.eigvals(loop)).max())
+
+
+def delay_margin(
+    parameters: Mapping[str, Any], law: TransferFunction, sample_rate_hz: float
+) -> float:
+    """Return the least constant delay (s) at which the linear loop is no longer stable.
+
+    Found at the gain crossovers as phase margin over frequency, then refined by the poles of the
+    sampled loop.
+
+    Returns:
+        0 if it is not stable without delay either, infinity if its gain stays below 1.
+    """
+
+    def excess(delay_s: float) -> float:
+        return spectral_radius(parameters, law, sample_rate_hz, delay_s) - 1.0
+
+    if excess(0.0) >= 0.0:
+        return 0.0
+    high = _phase_margin_s(parameters, law, sample_rate_hz)
+    if math.isinf(high):
+        return high
+    low = 0.0
+    while excess(high) < 0.0:
+        low, high = high, 1.1 * high
+    return float(brentq(excess, low, high, xtol=1e-9))
+
+
+def _phase_margin_s(
+    parameters: Mapping[str, Any], law: TransferFunction, sample_rate_hz: float
+) -> float:
+    """Return the least phase margin over frequency of all gain crossovers (s)."""
+    frequency_hz = np.geomspace(1e-4, 0.5, _FREQUENCIES) * sample_rate_hz
+    _, controller = freqz(law.numerator, law.denominator, frequency_hz, fs=sample_rate_hz)
+    loop = controller * g0(parameters, frequency_hz, sample_rate_hz)
+    above = np.abs(loop) > 1.0
+    crossovers = np.flatnonzero(above[1:] != above[:-1])
+    margin = np.mod(np.angle(loop[crossovers]) + np.pi, 2.0 * np.pi)
+    return float((margin / (2.0 * np.pi * frequency_hz[crossovers])).min(initial=math.inf))

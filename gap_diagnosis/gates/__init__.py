@@ -1,0 +1,1 @@
+"""Is the record fit for a diagnosis? Quality, controller identity, stationarity."""

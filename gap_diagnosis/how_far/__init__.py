@@ -1,0 +1,1 @@
+"""How far the gap shrinks, on data held out from the fits."""

@@ -1,0 +1,175 @@
+"""The judgement: what gates, search and held-out gap say together, as a `Diagnosis`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from fjr_records.recorded import RecordedExperiment
+
+from .gates.gate_checks import GateReport
+from .how_far.held_out_gap import held_out_gap
+from .model.simulated_rig import Model, Signals
+from .next_experiment.choice import next_experiment
+from .notes import notes, rounding
+from .outcome.diagnosis import Candidate, Diagnosis, Figure, Gaps, NextExperiment, Verdict
+from .outcome.verdict_words import ROUNDING
+from .where.residual_map import ResidualMap
+from .which.attribution import Attribution
+from .which.confidence import confidence
+from .which.estimates import estimates
+from .which.fits import Fit, Fitter
+
+NO_GAP = 2.0
+"""Held-out misfit of the nominal model per degree of freedom below which there is no gap."""
+
+
+def judge(
+    recorded: RecordedExperiment,
+    noise_std: np.ndarray,
+    gates: GateReport,
+    fitter: Fitter,
+    attribution: Attribution,
+    signals: Mapping[str, Signals],
+    maps: Mapping[str, ResidualMap],
+    *,
+    held_out: bool,
+) -> Diagnosis:
+    """Return the diagnosis of an experiment whose search has ended.
+
+    Args:
+        recorded: the experiment.
+        noise_std: `NoiseLevels.of_outputs`, or an upper bound of it.
+        gates: outcome of all gates.
+        fitter: of the search.
+        attribution: what the search found.
+        signals: simulated by each stage's model: nominal, refit, explained.
+        maps: residual map of each stage.
+        held_out: whether the data that the fits are judged by are such that no fit has seen.
+    """
+    best, refit = attribution.best, attribution.refit
+    held, size = fitter.held.which, fitter.held.size
+    misfits = {
+        "nominal": fitter.held.chi2(Model(fitter.nominal, {})),
+        "refit": refit.held_chi2 / size,
+        "explained": best.held_chi2 / size,
+    }
+    verdict = _verdict(attribution, misfits, gates)
+    named = list(best.effects) if verdict in ("effect", "ambiguous") else []
+    shown = best if named or verdict == "parameters_only" else refit
+    groups = fitter.train.groups()
+    rounded = ROUNDING in best.effects
+    closes = bool(best.effects) and not rounded
+    gaps, figures = held_out_gap(recorded, held, signals, misfits, closes)
+    said = notes(
+        gates, attribution, verdict, held_size=size, held_out=held_out, nominal=fitter.nominal,
+        tolerance=fitter.tolerance,
+    )  # fmt: skip
+    if rounded:
+        said.append(_rounding(recorded, held, best, signals, misfits, figures.position.refit))
+    closed = figures.position.closed
+    return _sure(
+        Diagnosis(
+            verdict=verdict,
+            effects=named,
+            equivalent=_equivalents(attribution) if named else [],
+            confidence=0.0,
+            reported_on="records" if held_out else "none",
+            gap=gaps,
+            gap_closed=None if closed is None else closed.value,
+            gap_figures=figures,
+            bags=gates.gates[-1].bags,
+            where=maps["refit" if misfits["refit"] > NO_GAP else "nominal"].places(),
+            ranking=[_candidate(fit, size, refit, groups) for fit in attribution.candidates],
+            parameters=estimates(shown, groups),
+            next_experiment=_next(recorded, noise_std, attribution, verdict),
+            notes=said,
+        )
+    )
+
+
+def stopped(verdict: Verdict, gates: GateReport) -> Diagnosis:
+    """Return the diagnosis of an experiment that a gate forbids to fit."""
+    nothing = Gaps(nominal=None, refit=None, explained=None, noise_floor=None)
+    said = [gate.sentence for gate in gates.failures] + list(gates.notes)
+    return _sure(Diagnosis(verdict=verdict, confidence=0.0, gap=nothing, notes=said))
+
+
+def _sure(diagnosis: Diagnosis) -> Diagnosis:
+    """Return a diagnosis with its confidence, which follows from its other fields."""
+    return diagnosis.model_copy(update={"confidence": confidence(diagnosis)})
+
+
+def _next(
+    recorded: RecordedExperiment,
+    noise_std: np.ndarray,
+    attribution: Attribution,
+    verdict: Verdict,
+) -> NextExperiment | None:
+    """Return the experiment that separates what is tied, or the best where nothing explains."""
+    fits: list[Fit] = []
+    if verdict == "ambiguous":
+        fits = [attribution.best, *attribution.tied]
+    elif verdict == "unexplained":
+        fits = [fit for fit in attribution.candidates if fit.converged][:2]
+    return next_experiment(recorded, noise_std, fits)
+
+
+def _verdict(attribution: Attribution, misfits: Mapping[str, float], gates: GateReport) -> Verdict:
+    if gates.hint != "none":
+        return gates.hint
+    best = attribution.best
+    if best.effects:
+        if not attribution.explained:
+            return "unexplained"
+        return "ambiguous" if attribution.tied else "effect"
+    if not attribution.explained:
+        return "unexplained"
+    return "no_gap" if misfits["nominal"] < NO_GAP else "parameters_only"
+
+
+def _rounding(
+    recorded: RecordedExperiment,
+    held: tuple[int, ...],
+    best: Fit,
+    signals: Mapping[str, Signals],
+    misfits: Mapping[str, float],
+    left: Figure | None,
+) -> str:
+    """Return the note on a coarse encoder: what the refit leaves beside what rounding makes."""
+    changes = [
+        np.mean((signals["explained"][0][i] - signals["refit"][0][i]) ** 2)
+        / np.mean(recorded.realizations[i].kept(recorded.realizations[i].position).mean(0) ** 2)
+        for i in held
+    ]
+    step = best.model.effects[f"{ROUNDING}.resolution_rad"]
+    made = float(np.sqrt(np.mean(changes)))
+    beside = misfits["refit"], misfits["explained"]
+    return rounding(step, 0.0 if left is None else left.value, made, beside)
+
+
+def _equivalents(attribution: Attribution) -> list[list[str]]:
+    """Return for each effect of the best explanation what may stand in its place."""
+    sets = []
+    for effect in attribution.best.effects:
+        rest = set(attribution.best.effects) - {effect}
+        others = {
+            name
+            for fit in attribution.tied
+            if rest <= set(fit.effects)
+            for name in set(fit.effects) - rest
+        }
+        sets.append([effect, *sorted(others - {effect})])
+    return sets
+
+
+def _candidate(fit: Fit, size: int, refit: Fit, groups: np.ndarray) -> Candidate:
+    found = estimates(fit, groups)
+    return Candidate(
+        effects=list(fit.effects),
+        held_out_chi2=fit.held_chi2 / size if fit.converged else None,
+        delta=refit.held_chi2 - fit.held_chi2 if fit.converged else None,
+        converged=fit.converged,
+        parameters={name: found[name] for name in fit.space.effects},
+    )

@@ -1,0 +1,183 @@
+"""The simulated rig as a model with free parameters: bare plant times a few effects."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from controller_node.transfer_function import law_of
+from fjr_kit.errors import InputError
+from fjr_records.noise import NoiseLevels, noise_levels
+from fjr_records.recorded import RecordedExperiment, RecordedRealization
+from fjr_sim_node import effects as fx
+from fjr_sim_node import plant
+from fjr_sim_node.simulation.closed_loop import Trajectory, simulate, simulate_law
+
+from . import prediction
+
+Signals = tuple[np.ndarray, np.ndarray]
+"""One steady period of y (rad) and of u (N m) of every realization, float64 (n, N) each."""
+
+_POOL = ThreadPoolExecutor(len(os.sched_getaffinity(0)))
+
+
+@dataclass(frozen=True)
+class Model:
+    """A plant with effects; immutable.
+
+    Attributes:
+        plant: the bare parameters by name (PLANT).
+        effects: parameters of effects by full name (`effect.parameter`); missing ones are off.
+    """
+
+    plant: Mapping[str, float]
+    effects: Mapping[str, float]
+
+    @classmethod
+    def nominal(cls, values: Mapping[str, Any]) -> Model:
+        """Return the bare model with checked PLANT values.
+
+        An infinite stiffness k0 means a rigid axis: motor and link are one body, of which only the
+        sums of inertia and friction count.
+        """
+        sums = plant.rigid_sums(values)
+        if sums is not None:
+            return cls(sums, {})
+        return cls({name: float(values[name]) for name in plant.PLANT.names}, {})
+
+    @property
+    def rigid(self) -> bool:
+        """Whether there is no flexible transmission."""
+        return "k0" not in self.plant
+
+    def with_effects(self, effects: Mapping[str, float]) -> Model:
+        """Return the model with further effect parameters set."""
+        return replace(self, effects={**self.effects, **effects})
+
+    @property
+    def plant_coefficients(self) -> tuple[float, ...]:
+        """Bare parameters as the compiled plant takes them."""
+        if self.rigid:
+            return plant.coefficients(
+                {"j": 0.0, "fs": 0.0, "fv": 0.0, "k0": math.inf, **self.plant}
+            )
+        return plant.coefficients(self.plant)
+
+    @property
+    def effect_coefficients(self) -> tuple[float, ...] | None:
+        """Effects as the compiled plant takes them; None if all are off."""
+        return fx.coefficients(self.effects)
+
+
+def run_parallel(run: Callable[[Any], np.ndarray], jobs: Sequence[Any]) -> list[np.ndarray]:
+    """Return the results of jobs, run on all cores; the kernels release the interpreter lock."""
+    return list(_POOL.map(run, jobs))
+
+
+class Simulator:
+    """Repeats a recorded experiment with a model, without noise.
+
+    Where controller and references are known, the loop itself is repeated from rest, one period
+    longer than the transient, and the last period is then periodic. Else the mean recorded period
+    of u drives the model, held to that of y by an observer (`prediction`).
+    """
+
+    def __init__(self, recorded: RecordedExperiment) -> None:
+        """Take the signals that drive the simulation."""
+        description = recorded.experiment
+        self.sample_rate_hz = description.sample_rate_hz
+        self.repeats = recorded.repeatable
+        self._recorded = recorded
+        self._samples = description.samples_per_period
+        self._outputs = 2 if recorded.has_link else 1
+        if self.repeats:
+            self._law = law_of(description.controller, self.sample_rate_hz)
+        else:
+            self._observer = prediction.observer(recorded)
+        self._periods = max(description.transient_periods, 1) + 1
+        self._inputs = [self._mean_inputs(realization) for realization in recorded.realizations]
+        self._elapsed = [realization.experiment.elapsed_s for realization in recorded.realizations]
+
+    def many(self, models: Sequence[Model], which: Sequence[int] | None = None) -> np.ndarray:
+        """Return one steady period of the measured outputs for each model.
+
+        Args:
+            models: the models to run.
+            which: indices of the realizations to repeat; None for all.
+
+        Returns:
+            float64 (models, n, outputs, N) in rad; y, and q if the rig has a second encoder. A
+            motion that diverges gives NaN.
+        """
+        runs = self._run(models, which)
+        return runs[:, :, [0, 2][: self._outputs]]
+
+    def signals(self, model: Model, which: Sequence[int] | None = None) -> Signals:
+        """Return one steady period of y and of u."""
+        run = self._run([model], which)[0]
+        return run[:, 0], run[:, 1]
+
+    def motion(
+        self, model: Model, which: Sequence[int]
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return one steady period of y (rad), u (N m) and q (rad), float64 (n, N) each."""
+        run = self._run([model], which)[0]
+        return run[:, 0], run[:, 1], run[:, 2]
+
+    def noise(self, model: Model) -> NoiseLevels | None:
+        """Return the noise of what is compared: of the signals, or of their prediction errors.
+
+        Where a prediction is compared, a model predicts every period as it was recorded; what it
+        does wrong repeats with the periods, so that the scatter is that of the noise alone.
+        """
+        if self.repeats:
+            return noise_levels(self._recorded)
+        runs = [
+            self._simulated(model, (r.position.ravel(), r.torque.ravel()), self._elapsed[index])
+            for index, r in enumerate(self._recorded.realizations)
+        ]
+        return noise_levels(prediction.errors(self._recorded, runs))
+
+    def _mean_inputs(self, realization: RecordedRealization) -> tuple[np.ndarray, ...]:
+        """Return what drives the simulation, periods after each other: r, or y and u."""
+        samples = self._periods * self._samples
+        if self.repeats:
+            return (np.resize(realization.played.ravel(), samples),)
+        signals = (realization.position, realization.torque)
+        return tuple(np.resize(realization.kept(s).mean(axis=0), samples) for s in signals)
+
+    def _run(self, models: Sequence[Model], which: Sequence[int] | None) -> np.ndarray:
+        """Return y, u and q, float64 (models, n, 3, N)."""
+        indices = range(len(self._inputs)) if which is None else which
+        jobs = [(model, index) for model in models for index in indices]
+        out = np.array(run_parallel(self._one, jobs))
+        return out.reshape(len(models), len(indices), 3, self._samples)
+
+    def _one(self, job: tuple[Model, int]) -> np.ndarray:
+        model, index = job
+        try:
+            run = self._simulated(model, self._inputs[index], self._elapsed[index])
+        except InputError:
+            return np.full((3, self._samples), np.nan)
+        link = run.motor if model.rigid else run.link
+        return np.array([s[-self._samples :] for s in (run.position, run.torque, link)])
+
+    def _simulated(
+        self, model: Model, inputs: tuple[np.ndarray, ...], elapsed_s: float
+    ) -> Trajectory:
+        p, e = model.plant_coefficients, model.effect_coefficients
+        if self.repeats:
+            (reference,) = inputs
+            return simulate(reference, self.sample_rate_hz, p, self._law, None, e, elapsed_s)
+        position, torque = inputs
+        speed = (position[1] - position[0]) * self.sample_rate_hz
+        return simulate_law(
+            position, self.sample_rate_hz, p, self._observer, None, e, elapsed_s,
+            added_torque=torque, start=(float(position[0]), float(speed)),
+        )  # fmt: skip

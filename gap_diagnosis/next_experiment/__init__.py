@@ -1,0 +1,1 @@
+"""The experiment that best separates the explanations that the data leave."""

@@ -1,0 +1,242 @@
+"""The next experiment: which one best separates the explanations that the data leave.
+
+For each feasible trial and each pair of explanations, one plays the rig and the other is refitted
+to it, all its parameters free but held by the data that are already there; what still differs, in
+standard deviations of the noise, is the separation that the trial promises. A pair counts by its
+weaker direction. Some pairs no experiment separates (a torque bias is the same as a Coulomb
+friction that depends on direction); so that trial is best that separates most pairs, and of those
+the one that separates them best for its rig time.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from controller_node.transfer_function import law_of
+from fjr_kit.errors import InputError
+from fjr_records.recorded import RecordedExperiment
+from fjr_records.spectra import line_spectrum
+from fjr_sim_node.simulation.closed_loop import simulate
+
+from ..model.misfit import MODEL_ERROR
+from ..model.simulated_rig import Model, run_parallel
+from ..outcome.diagnosis import NextExperiment
+from ..which.fits import Fit
+from .trials import Trial, trials
+
+LEAST_SIGMA = 10.0
+"""A pair counts as separated from this on: the chi-square of an effect that is called for."""
+ENOUGH_SIGMA = 40.0
+"""More than that is not worth rig time."""
+TORQUE_MARGIN = 2.5
+"""A trial may ask for so many times the torque of the record."""
+MOST_RIVALS = 4
+_STEP = 1e-4
+_REFINED = 2  # trials whose separation is computed with refits that are not only linear
+_PASSES = 3
+
+Pair = tuple[int, int]
+
+
+def next_experiment(
+    recorded: RecordedExperiment, noise_std: np.ndarray, fits: Sequence[Fit]
+) -> NextExperiment | None:
+    """Choose the experiment that best separates explanations, for the rig time it costs.
+
+    Args:
+        recorded: the experiment so far.
+        noise_std: `NoiseLevels.of_outputs`, (realizations, outputs, lines), rad.
+        fits: the explanations that the data leave, best first; at most four are compared.
+
+    Returns:
+        None with fewer than two explanations, where the loop cannot be simulated, or where no
+        feasible trial promises to separate any of them.
+    """
+    rivals = list(fits)[:MOST_RIVALS]
+    if len(rivals) < 2 or not recorded.repeatable:
+        return None
+    bench = _Bench(recorded, noise_std, rivals)
+    screened = [(t, found) for t in trials(recorded, bench.rigid) if (found := bench.linear(t))]
+    screened.sort(key=lambda one: bench.merit(*one), reverse=True)
+    refined = [(t, bench.refitted(t)) for t, _ in screened[:_REFINED]]
+    if not refined:
+        return None
+    best, sigmas = max(refined, key=lambda one: bench.merit(*one))
+    told = _told(sigmas)
+    if not told:
+        return None
+    names = [" + ".join(fit.effects) or "parameters" for fit in rivals]
+    left = [f"{names[a]} from {names[b]}" for a, b in sigmas if (a, b) not in told]
+    return NextExperiment(
+        kind=best.kind,
+        description=best.description + (f" It will not tell {', '.join(left)}." if left else ""),
+        separates=[name for i, name in enumerate(names) if any(i in pair for pair in told)],
+        predicted_sigma=min(sigmas[pair] for pair in told),
+        rig_time_s=bench.rig_time_s(best),
+        settings=dict(best.settings),
+    )
+
+
+def _told(sigmas: Mapping[Pair, float]) -> list[Pair]:
+    """Return the pairs that are separated."""
+    return [pair for pair, sigma in sigmas.items() if sigma >= LEAST_SIGMA]
+
+
+@dataclass(frozen=True)
+class _Response:
+    """A rival in a trial: lines of its outputs, and how they change with its parameters."""
+
+    lines: np.ndarray  # complex (outputs, lines)
+    slopes: np.ndarray  # complex (parameters, outputs, lines)
+
+
+class _Bench:
+    """Simulates trials with the rivals; the first realization of a trial stands for all."""
+
+    def __init__(
+        self, recorded: RecordedExperiment, noise_std: np.ndarray, fits: Sequence[Fit]
+    ) -> None:
+        description = recorded.experiment
+        self._rate = description.sample_rate_hz
+        self._law = law_of(description.controller, self._rate)
+        self._samples = description.samples_per_period
+        self._periods = description.periods
+        self._transient = max(description.transient_periods, 1)
+        torques = [float(np.abs(r.torque).max()) for r in recorded.realizations]
+        self._most_torque = TORQUE_MARGIN * max(torques)
+        self._noise = np.median(noise_std, axis=0)
+        self._fits = list(fits)
+        # What even the best explanation leaves counts as noise.
+        self._left = max(1.0, min(f.train_chi2 / f.solution.residuals.size for f in fits)) ** 0.5
+        # What the recorded data say of each rival's parameters.
+        self._held = [np.linalg.qr(f.solution.jacobian)[1] / self._left for f in fits]
+
+    @property
+    def rigid(self) -> bool:
+        """Whether the rig is a rigid axis."""
+        return self._fits[0].model.rigid
+
+    def rig_time_s(self, trial: Trial) -> float:
+        """Return what a trial costs (s)."""
+        played = (self._discarded(trial) + self._periods) * self._samples / self._rate
+        return trial.setup_s + played * len(trial.periods_rad)
+
+    def merit(self, trial: Trial, sigmas: Mapping[Pair, float]) -> tuple[float, ...]:
+        """Return what trials are compared by: pairs separated, then separation for its cost.
+
+        Twice the rig time averages twice the noise, so separation grows with the root of it.
+        """
+        told = _told(sigmas)
+        least = min((sigmas[pair] for pair in told), default=max(sigmas.values()))
+        return len(told), min(least, ENOUGH_SIGMA) / self.rig_time_s(trial) ** 0.5, least
+
+    def linear(self, trial: Trial) -> dict[Pair, float] | None:
+        """Return the separation of each pair with linear refits; None if it is not feasible."""
+        runs = self._run(trial, [fit.model for fit in self._fits])
+        if not np.isfinite(runs).all() or np.abs(runs[:, 1]).max() > self._most_torque:
+            return None
+        responses = [self._response(trial, fit) for fit in self._fits]
+        return self._weaker(trial, lambda a, b: self._linear(trial, responses, a, b))
+
+    def refitted(self, trial: Trial) -> dict[Pair, float]:
+        """Return the separation of each pair with simulated refits."""
+        return self._weaker(trial, lambda a, b: self._refit(trial, a, b))
+
+    def _weaker(self, trial: Trial, separation) -> dict[Pair, float]:
+        """Return the smaller of the separations of both directions, over all realizations."""
+        pairs = itertools.combinations(range(len(self._fits)), 2)
+        more = len(trial.periods_rad) ** 0.5
+        return {(a, b): more * min(separation(a, b), separation(b, a)) for a, b in pairs}
+
+    def _discarded(self, trial: Trial) -> int:
+        return self._transient + (1 if trial.offset_rad else 0)
+
+    def _run(self, trial: Trial, models: Sequence[Model]) -> np.ndarray:
+        """Return the last period of y, u and q, float64 (models, 3, N); NaN if it diverges."""
+        reference = trial.references(self._discarded(trial) + 1)[0]
+
+        def one(model: Model) -> np.ndarray:
+            p, e = model.plant_coefficients, model.effect_coefficients
+            try:
+                run = simulate(reference, self._rate, p, self._law, None, e)
+            except InputError:
+                return np.full((3, self._samples), np.nan)
+            link = run.motor if model.rigid else run.link
+            return np.array([s[-self._samples :] for s in (run.position, run.torque, link)])
+
+        return np.array(run_parallel(one, [trial.loaded(model) for model in models]))
+
+    def _lines(self, trial: Trial, models: Sequence[Model]) -> np.ndarray:
+        """Return the lines of y (and q) of each model, complex (models, outputs, lines)."""
+        outputs = [0, 2][: self._noise.shape[0]]
+        return line_spectrum(self._run(trial, models)[:, outputs], trial.lines)
+
+    def _response(self, trial: Trial, fit: Fit) -> _Response:
+        x, steps = fit.solution.x, _steps(fit, fit.solution.x)
+        points = np.vstack([x, x + np.diag(steps)])
+        lines = self._lines(trial, [fit.space.model(point) for point in points])
+        return _Response(lines[0], (lines[1:] - lines[0]) / steps[:, None, None])
+
+    def _linear(
+        self, trial: Trial, responses: Sequence[_Response], truth: int, rival: int
+    ) -> float:
+        """Return what differs after a linear refit of the rival to the truth, in sigma."""
+        weight = self._weight(trial, responses[truth].lines)
+        mine = responses[rival]
+        d = _parts((mine.lines - responses[truth].lines) * weight)
+        slopes = np.vstack([_parts(mine.slopes * weight).T, self._held[rival]])
+        d = np.concatenate([d, np.zeros(len(slopes) - d.size)])
+        return float(np.linalg.norm(d - slopes @ np.linalg.lstsq(slopes, d, rcond=1e-9)[0]))
+
+    def _refit(self, trial: Trial, truth: int, rival: int) -> float:
+        """Return what differs after the rival was refitted to the truth, in sigma."""
+        fit = self._fits[rival]
+        target = self._lines(trial, [self._fits[truth].model])[0]
+        weight = self._weight(trial, target)
+        low, high = fit.space.bounds()
+
+        def differences(points: np.ndarray) -> np.ndarray:
+            """Return weighted differences, and what the record says against each point."""
+            lines = self._lines(trial, [fit.space.model(point) for point in points]) - target
+            held = (points - fit.solution.x) @ self._held[rival].T
+            return np.nan_to_num(np.hstack([_parts(lines * weight), held]), nan=1e6)
+
+        x = fit.solution.x
+        d = differences(x[None])[0]
+        for _ in range(_PASSES):
+            steps = _steps(fit, x)
+            slopes = ((differences(x + np.diag(steps)) - d) / steps[:, None]).T
+            change = np.linalg.lstsq(slopes, -d, rcond=1e-9)[0]
+            points = np.clip(x + np.array([[1.0], [0.3], [0.1]]) * change, low, high)
+            found = differences(points)
+            costs = np.einsum("ij,ij->i", found, found)
+            best = int(np.argmin(costs))
+            if costs[best] >= d @ d:
+                break
+            x, d = points[best], found[best]
+        return float(np.linalg.norm(d))
+
+    def _weight(self, trial: Trial, target: np.ndarray) -> np.ndarray:
+        """Return the inverse standard deviation of the lines of a trial, as in the misfit."""
+        noise = self._noise
+        beyond = max(trial.lines - noise.shape[1], 0)
+        noise = np.concatenate([noise, np.repeat(noise[:, -1:], beyond, axis=1)], axis=1)
+        weight = np.sqrt(2.0) / np.hypot(noise[:, : trial.lines], MODEL_ERROR * np.abs(target))
+        weight[:, 0] /= np.sqrt(2.0)
+        weight[1:, 0] = 0.0
+        return weight / self._left
+
+
+def _steps(fit: Fit, x: np.ndarray) -> np.ndarray:
+    """Return steps of finite differences that stay within the bounds."""
+    return np.where(x + _STEP <= fit.space.bounds()[1], _STEP, -_STEP)
+
+
+def _parts(lines: np.ndarray) -> np.ndarray:
+    """Return real and imaginary parts of lines (..., outputs, lines), as (..., errors)."""
+    parts = np.concatenate([lines.real, lines[..., 1:].imag], axis=-1)
+    return parts.reshape(*lines.shape[:-2], -1)

@@ -1,0 +1,1 @@
+"""The outcome of a diagnosis: its schema, and verdicts in plain words."""

@@ -1,0 +1,193 @@
+"""The outcome of a diagnosis: `diagnosis.json`, schema fjr_rig/diagnosis/1."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from fjr_kit.result_types import Document, FreeForm, Number, OptionalNumber, ResultModel, Unit
+
+Verdict = Literal[
+    "no_gap",
+    "parameters_only",
+    "effect",
+    "ambiguous",
+    "unexplained",
+    "nonstationary",
+    "bad_data",
+]
+ReportedOn = Literal["records", "none"]
+LineKind = Literal["excited", "odd", "even", "dc"]
+
+
+class Estimate(ResultModel):
+    """A parameter with its 95 % interval, in the unit that ends its name."""
+
+    value: Number
+    low: Number
+    high: Number
+
+
+class Gap(ResultModel):
+    """A distance between rig and simulation, on the data of `Diagnosis.reported_on`.
+
+    Attributes:
+        nrmse_position: rms of y error over rms of y.
+        nrmse_torque: rms of u error over rms of u.
+        chi2_per_dof: mean squared line error of y over its noise variance.
+    """
+
+    nrmse_position: OptionalNumber
+    nrmse_torque: OptionalNumber
+    chi2_per_dof: OptionalNumber
+
+
+class Gaps(ResultModel):
+    """The gaps: as delivered, after the refit, after the effect, and of the noise alone."""
+
+    nominal: Gap | None
+    refit: Gap | None
+    explained: Gap | None
+    noise_floor: Gap | None
+
+
+class Figure(ResultModel):
+    """A figure with its 95 % interval; the interval is None where one realization is held out."""
+
+    value: Number
+    low: OptionalNumber
+    high: OptionalNumber
+
+
+class StageFigures(ResultModel):
+    """One figure at each stage, and the share of it that the effect closes.
+
+    Attributes:
+        nominal, refit, explained: of the simulation; None where it diverges.
+        noise_floor: what noise alone leaves; None where one period was kept.
+        closed: 1 - (explained^2 - floor^2)/(refit^2 - floor^2); None without an effect, where the
+            refit leaves nothing that differs from noise, where the effect brings the simulation no
+            nearer, and for an effect that acts like noise.
+    """
+
+    nominal: Figure | None
+    refit: Figure | None
+    explained: Figure | None
+    noise_floor: Figure | None
+    closed: Figure | None
+
+
+class BagTrend(ResultModel):
+    """How friction or stiffness changes along the record.
+
+    Attributes:
+        change_percent: along a line, over the whole record.
+        p_value: how often scatter alone shows such a trend.
+    """
+
+    change_percent: Annotated[Number, Unit("%")]
+    p_value: Number
+
+
+class Bags(ResultModel):
+    """What changes from bag to bag.
+
+    Attributes:
+        trends: of friction and of stiffness.
+        scatter_percent: standard deviation of each parameter between bags.
+        accounted: share of the misfit of all bags that such changes account for.
+    """
+
+    trends: dict[str, BagTrend]
+    scatter_percent: dict[str, Estimate]
+    accounted: Number
+
+
+class GapFigures(ResultModel):
+    """The gap with intervals; see `held_out_gap` for what each figure is."""
+
+    position: StageFigures
+    torque: StageFigures
+    bla_sigma: StageFigures
+    distortion_db: StageFigures
+
+
+class Place(ResultModel):
+    """Where the gap lies: a band of one level, one kind of line, one signal."""
+
+    level: int
+    band_hz: Annotated[tuple[float, float], Unit("Hz")]
+    lines: LineKind
+    signal: Literal["position", "torque"]
+    sigma: Number
+
+
+class Candidate(ResultModel):
+    """One explanation that was fitted."""
+
+    effects: list[str]
+    held_out_chi2: OptionalNumber
+    delta: OptionalNumber
+    converged: bool
+    parameters: dict[str, Estimate]
+
+
+class NextExperiment(ResultModel):
+    """The experiment that best separates what is still ambiguous.
+
+    Attributes:
+        kind: what to do, such as amplitude, dc_offset, added_inertia.
+        description: one sentence for the lab.
+        separates: the effects that it tells apart.
+        predicted_sigma: predicted separation in standard deviations of the noise.
+        rig_time_s: what it costs.
+        settings: numbers to set, by name with unit.
+    """
+
+    kind: str
+    description: str
+    separates: list[str]
+    predicted_sigma: Number
+    rig_time_s: Annotated[Number, Unit("s")]
+    settings: FreeForm = Field(default_factory=dict)
+
+
+class Diagnosis(Document):
+    """The whole diagnosis.
+
+    Attributes:
+        verdict: what is said.
+        effects: the best explanation; empty unless the verdict is effect or ambiguous.
+        equivalent: one set for each named effect: what the data cannot tell from it.
+        confidence: calibrated probability that the verdict is right; capped where nothing was
+            held out.
+        reported_on: what all figures were computed on: `records` that no fit has seen, or `none`
+            such, so that they are those of the fit itself.
+        gap: the gaps at each stage.
+        gap_closed: share of what the refit left that the effect explains; None without an effect,
+            and where a share means nothing.
+        gap_figures: the gap in four figures with intervals; None where nothing was simulated.
+        bags: what changes from bag to bag; None where that cannot be tested.
+        where: the places of the gap, strongest first.
+        ranking: all explanations that were fitted, best first.
+        parameters: base parameters and effect parameters of the best explanation.
+        next_experiment: what to do where the set stays ambiguous.
+        notes: sentences that a reader must see.
+    """
+
+    schema_name: Literal["fjr_rig/diagnosis/1"] = Field("fjr_rig/diagnosis/1", alias="schema")
+    verdict: Verdict
+    effects: list[str] = Field(default_factory=list)
+    equivalent: list[list[str]] = Field(default_factory=list)
+    confidence: float = Field(ge=0.0, le=1.0)
+    reported_on: ReportedOn = "records"
+    gap: Gaps
+    gap_closed: OptionalNumber = None
+    gap_figures: GapFigures | None = None
+    bags: Bags | None = None
+    where: list[Place] = Field(default_factory=list)
+    ranking: list[Candidate] = Field(default_factory=list)
+    parameters: dict[str, Estimate] = Field(default_factory=dict)
+    next_experiment: NextExperiment | None = None
+    notes: list[str] = Field(default_factory=list)

@@ -1,0 +1,161 @@
+"""Verdicts in plain words: meaning, next step, and when not to believe them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from fjr_sim_node import effects as fx
+from fjr_sim_node.simulation.simulator import SIMULATOR
+
+from .diagnosis import Diagnosis, ReportedOn, Verdict
+
+ROUNDING = "encoder_quantization"
+"""The effect that acts like noise in a loop, and is judged by its statistics."""
+
+
+@dataclass(frozen=True)
+class Words:
+    """A verdict for a person.
+
+    Attributes:
+        headline: a few words.
+        meaning: what it says about rig and simulation; {on} stands for `ON`.
+        action: what to do next.
+        doubt: when not to believe it.
+    """
+
+    headline: str
+    meaning: str
+    action: str
+    doubt: str
+
+
+WORDS: dict[Verdict, Words] = {
+    "no_gap": Words(
+        "No gap",
+        "Rig and nominal simulation agree within the noise at all levels.",
+        "Use the nominal parameters as they are.",
+        "Loud noise hides small effects: look at the noise floor. Amplitudes and frequencies that "
+        "were not played are not covered.",
+    ),
+    "parameters_only": Words(
+        "Parameters only",
+        "Refitted parameters of the bare plant explain the gap; no further effect is needed.",
+        "Go on with updated.yaml.",
+        "A torque-constant error looks exactly like all parameters scaled by one factor. An effect "
+        "that needs another amplitude, a DC offset or a higher band to show is not excluded.",
+    ),
+    "effect": Words(
+        "An effect is missing",
+        "After the refit a gap remained; one explanation of the catalogue closes it{on}, and none "
+        "of the others comes near.",
+        "Go on with updated.yaml, which switches the effect on.",
+        "Outside the recorded amplitudes and band the effect is extrapolated. A cause that is not "
+        "in the catalogue but acts like this effect there gets its name. Don't believe it if the "
+        "refitted parameters lie at their bounds, or if the explained misfit is far above 1 and "
+        "the maps still show bands.",
+    ),
+    "ambiguous": Words(
+        "An effect is missing, several explain it",
+        "After the refit a gap remained; the explanations of the set close it equally well on "
+        "these data.",
+        "Run the next experiment to tell them apart; until then updated.yaml holds the first.",
+        "The true one is in the set only if it is in the catalogue. Outside the recorded "
+        "amplitudes and band the members of the set part.",
+    ),
+    "unexplained": Words(
+        "Unexplained",
+        "A gap remains after the refit, and no explanation of the catalogue closes it.",
+        "Look at where it lies below; updated.yaml holds the refit, which is the best there is. "
+        "Check mounting, encoder and logging before looking for a law of friction.",
+        "More than two effects at once, or fits that did not converge (see the ranking), can end "
+        "here too.",
+    ),
+    "nonstationary": Words(
+        "The rig changes while it is recorded",
+        "The response drifts along a trend between periods or bags, which no time-invariant model "
+        "explains.",
+        "Let the rig warm up, record levels interleaved, and diagnose again.",
+        "One disturbed bag can look like a drift: see which one stands out.",
+    ),
+    "bad_data": Words(
+        "The data do not allow a diagnosis",
+        "A gate failed: something other than the plant explains a difference, so nothing was "
+        "fitted.",
+        "Mend what the gate names, and record again if need be.",
+        "The gate's limit and value are in the table; the other gates were tested too.",
+    ),
+}
+"""The words of every verdict."""
+
+
+ON: dict[ReportedOn, str] = {
+    "records": " on data that its fit has not seen",
+    "none": " on the data that it was fitted to (nothing was held out: no prediction was tested)",
+}
+"""On which data an explanation closes the gap."""
+
+HELD_OUT: dict[ReportedOn, str] = {"records": "held-out", "none": "fitted"}
+"""What the data are called that all figures were computed on."""
+
+
+def meaning(diagnosis: Diagnosis) -> str:
+    """Return what the verdict says about rig and simulation."""
+    return WORDS[diagnosis.verdict].meaning.format(on=ON[diagnosis.reported_on])
+
+
+def closed(diagnosis: Diagnosis) -> str:
+    """Return which share of the gap is closed, or that none can be stated; empty without effect."""
+    if diagnosis.gap_closed is None:
+        if not explains(diagnosis):
+            return ""
+        why = (
+            "rounding acts like noise in a loop, so that a simulation meets it in size but not "
+            "sample by sample; see the note on its statistics"
+            if ROUNDING in diagnosis.effects
+            else "by the rms error of the position the refit leaves nothing beyond noise, or the "
+            "explanation brings the simulation no nearer to the rig"
+        )
+        return f"No share of the gap is stated: {why}."
+    figures = diagnosis.gap_figures
+    share = figures.position.closed if figures else None
+    sure = ""
+    if share is not None and share.low is not None and share.high is not None:
+        sure = f" (95 %: {share.low:.1%} to {share.high:.1%})"
+    where = "" if diagnosis.reported_on == "records" else " on the data that were fitted"
+    return f"{diagnosis.gap_closed:.1%} of what the refit left is closed{where}{sure}."
+
+
+def explains(diagnosis: Diagnosis) -> bool:
+    """Tell whether there is an explanation beyond the refit whose gap can be shown."""
+    explained = diagnosis.gap.explained
+    return explained is not None and explained != diagnosis.gap.refit
+
+
+def explanation(effects: list[str]) -> str:
+    """Return effects as shown to a person, such as 'backlash + delay'."""
+    return " + ".join(name.replace("_", " ") for name in effects) or "bare plant"
+
+
+def headline(diagnosis: Diagnosis) -> str:
+    """Return the verdict in one line."""
+    words = WORDS[diagnosis.verdict].headline
+    if not diagnosis.effects:
+        return words
+    if diagnosis.verdict == "ambiguous":
+        sets = "; ".join(
+            " or ".join(explanation([name]) for name in members) for members in diagnosis.equivalent
+        )
+        return f"An effect is missing: {sets}"
+    return f"Missing: {explanation(diagnosis.effects)}"
+
+
+def summaries(diagnosis: Diagnosis) -> list[str]:
+    """Return a sentence about each named effect, and each that may stand in its place."""
+    names = dict.fromkeys(name for members in diagnosis.equivalent for name in members)
+    return [f"{explanation([name])}: {fx.EFFECTS[name].summary}" for name in names]
+
+
+def unit_of(name: str) -> str:
+    """Return the unit of a base parameter or of an effect's parameter."""
+    return SIMULATOR[name].unit

@@ -1,0 +1,1 @@
+"""The report of a diagnosis: figures, tables, and one HTML page that opens offline."""

@@ -1,0 +1,165 @@
+"""Tables of a diagnosis: the rows that the report's template shows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import nan
+from typing import Any
+
+import numpy as np
+
+from bla_analyzer.results.summary import mean_level_db
+from fjr_kit.page import Cell, Column, Mark, Row
+
+from ..gates.gate_checks import GateReport
+from ..how_far.comparison import LevelComparison, Response, bla_distance_db, bla_distance_sigma
+from ..outcome.diagnosis import Diagnosis, Estimate, Figure, Gap
+from ..outcome.verdict_words import explains, explanation, unit_of
+from ..which.attribution import Attribution
+from .gap_level_plots import MODEL_STYLES
+
+MOST_PLACES = 12
+LABELS = {k: label for k, (label, *_) in MODEL_STYLES.items()} | {"noise_floor": "noise floor"}
+
+
+def gates(report: GateReport) -> list[Row]:
+    """Return all gates, failed ones first: name, whether it passed, value, limit, sentence."""
+    rows: list[Row] = []
+    for gate in sorted(report.gates, key=lambda gate: gate.passed):
+        word: Cell = Mark.of(gate.passed) if gate.limit == gate.limit else "not tested"
+        rows.append((gate.name, word, gate.value, gate.limit, gate.sentence))
+    return rows
+
+
+def places(diagnosis: Diagnosis) -> list[Row]:
+    """Return the strongest bands: signal, lines, level, ends (Hz), sigma of noise."""
+    return [
+        (p.signal, p.lines, str(p.level), *p.band_hz, p.sigma)
+        for p in diagnosis.where[:MOST_PLACES]
+    ]
+
+
+def candidates(attribution: Attribution, diagnosis: Diagnosis, held_size: int) -> list[Row]:
+    """Return every explanation with misfit, gain, convergence and effect parameters."""
+    refit = attribution.refit
+    left = refit.held_chi2 / held_size
+    rows: list[Row] = [("refit alone", left, 0.0, _converged(refit.converged), "")]
+    for candidate in diagnosis.ranking:
+        misfit = nan if candidate.held_out_chi2 is None else candidate.held_out_chi2
+        gain = nan if candidate.delta is None else candidate.delta
+        values = [_estimate(n, e) for n, e in candidate.parameters.items()]
+        found = _converged(candidate.converged)
+        rows.append((explanation(candidate.effects), misfit, gain, found, values))
+    return rows
+
+
+def _converged(converged: bool) -> Cell:
+    return "converged" if converged else Mark("not converged", "fail")
+
+
+def _estimate(name: str, estimate: Estimate) -> str:
+    short = name.split(".", 1)[1]
+    return f"{short} {estimate.value:.4g} [{estimate.low:.4g}, {estimate.high:.4g}]"
+
+
+def parameters(
+    attribution: Attribution, diagnosis: Diagnosis, nominal: Mapping[str, float]
+) -> list[Row]:
+    """Return name, unit, nominal value, estimate, interval, change (%) of what is shown."""
+    bounds = _bounds(attribution)
+    rows: list[Row] = []
+    for name, e in diagnosis.parameters.items():
+        given = nominal.get(name, nan)
+        change = 100.0 * (e.value / given - 1.0) if given else nan
+        note: Cell = Mark("at its bound", "fail") if _at(e.value, bounds.get(name)) else ""
+        rows.append((name, unit_of(name), given, e.value, e.low, e.high, change, note))
+    return rows
+
+
+def _bounds(attribution: Attribution) -> Mapping[str, tuple[float, float]]:
+    space = attribution.best.space
+    low, high = space.bounds()
+    ends = space.model(low), space.model(high)
+    return {name: (ends[0].plant[name], ends[1].plant[name]) for name in space.nominal}
+
+
+def _at(value: float, bounds: tuple[float, float] | None) -> bool:
+    if bounds is None or bounds[0] == bounds[1]:
+        return False
+    return min(abs(value - end) for end in bounds) < 1e-3 * (bounds[1] - bounds[0])
+
+
+def _shown(diagnosis: Diagnosis) -> list[str]:
+    """Return the stages whose gaps are shown: that of no explanation is not."""
+    return [stage for stage in LABELS if stage != "explained" or explains(diagnosis)]
+
+
+FIGURES: dict[str, tuple[str, float]] = {
+    "position": ("position, % of its rms", 100.0),
+    "torque": ("torque, % of its rms", 100.0),
+    "bla_sigma": ("BLA, rms in \N{GREEK SMALL LETTER SIGMA}", 1.0),
+    "distortion_db": ("distortion level, dB off", 1.0),
+}
+"""What each of the gap's figures is called, and the factor of what is shown."""
+
+
+def gap_table(diagnosis: Diagnosis) -> dict[str, Any] | None:
+    """Return columns and rows of the gap: figures with 95 % intervals, misfit of each stage.
+
+    None where nothing was simulated.
+    """
+    found = diagnosis.gap_figures
+    if found is None:
+        return None
+    stages = _shown(diagnosis)
+    columns = [Column(""), *(Column(LABELS[stage]) for stage in stages)]
+    shares = any(getattr(found, name).closed is not None for name in FIGURES)
+    columns += [Column("closed", "of what the refit left, %")] if shares else []
+    rows: list[Row] = []
+    for name, (label, factor) in FIGURES.items():
+        figure = getattr(found, name)
+        cells = [_interval(getattr(figure, stage), factor) for stage in stages]
+        if shares:
+            cells.append(_interval(figure.closed, 100.0))
+        rows.append((label, *cells))
+    misfits = [_misfit(getattr(diagnosis.gap, stage)) for stage in stages]
+    rows.append(("misfit per degree of freedom", *misfits, *(["-"] if shares else [])))
+    return {"columns": columns, "rows": rows}
+
+
+def _misfit(gap: Gap | None) -> str:
+    return "-" if gap is None or gap.chi2_per_dof is None else f"{gap.chi2_per_dof:.4g}"
+
+
+def _interval(figure: Figure | None, factor: float) -> str:
+    if figure is None:
+        return "-"
+    value = f"{factor * figure.value:.3g}"
+    if figure.low is None or figure.high is None:
+        return value
+    return f"{value} [{factor * figure.low:.3g}, {factor * figure.high:.3g}]"
+
+
+def distances(found: list[LevelComparison]) -> dict[str, list[Any]]:
+    """Return how far BLA and distortion of each simulation are from the rig's, by level."""
+    rows: list[Row] = []
+    levels = []
+    for i, level in enumerate(found):
+        for name, response in level.models.items():
+            far = [
+                bla_distance_db(level.rig, response),
+                bla_distance_sigma(level.rig, response),
+                _excess_db(level.rig, response, "odd"),
+                _excess_db(level.rig, response, "even"),
+            ]
+            label = f"{level.level}, {level.amplitude_rad:.3g} rad"
+            rows.append((label, MODEL_STYLES[name][0], *far))
+            levels.append(i)
+    return {"rows": rows, "levels": levels}
+
+
+def _excess_db(rig: Response, model: Response, kind: str) -> float:
+    """Return the level of a simulation, with the rig's noise added, over the rig's in dB."""
+    measured, simulated = getattr(rig, kind), getattr(model, kind)
+    noisy = np.hypot(simulated.corrected, np.nan_to_num(measured.noise))
+    return mean_level_db(noisy) - mean_level_db(measured.corrected)

@@ -1,0 +1,1 @@
+"""Where the gap lies: lines, amplitudes, times, and the residual torque."""

@@ -1,0 +1,292 @@
+"""Fits of one explanation: a set of effects with all base parameters free, in closed loop."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+
+import numpy as np
+
+from fjr_records.recorded import RecordedExperiment
+from fjr_sim_node import effects as fx
+
+from ..model.misfit import Misfit
+from ..model.simulated_rig import Model, Simulator
+from .least_squares import Solution, solve
+from .ripples import RippleSearch
+from .screening import Proposal, Screening
+from .search_space import TOLERANCE, Space, space_for, starts
+
+_KEPT_STARTS = 2
+_MOST_STEPS = 40
+MORE_STEPS = 160  # along a valley in which sizes and parameters nearly replace each other
+_NESTED_STEPS = 3
+_FIRST_STEPS = 6
+RIPPLES_TRIED = 4
+_RIVAL = 1.5  # a second start that stays this far above the first is not pursued
+NO_PROMISE = 0.998  # of the parent's chi-square: a start that gains less is not pursued far
+
+
+@dataclass(frozen=True)
+class Fit:
+    """One explanation after fitting.
+
+    Attributes:
+        effects: identifiers, sorted; empty for the refit of the base parameters alone.
+        model: the fitted model.
+        space: the space in which it was fitted.
+        solution: the optimiser's end.
+        train_chi2: sum of squares over the training realizations.
+        held_chi2: sum of squares over the held-out realizations.
+        without: training chi-square of the fit that lacks an effect, by identifier, where that was
+            fitted.
+    """
+
+    effects: tuple[str, ...]
+    model: Model
+    space: Space
+    solution: Solution
+    train_chi2: float
+    held_chi2: float
+    without: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def converged(self) -> bool:
+        """Whether the optimiser converged; only then is the fit ranked."""
+        return self.solution.converged
+
+
+class Fitter:
+    """Fits explanations to one recorded experiment.
+
+    Attributes:
+        recorded: the experiment.
+        nominal: datasheet values of the base parameters.
+        tolerance: how far a datasheet value may be off, relative.
+        train, held: misfit of the realizations to fit, and of those to judge by.
+        peak_torque_nm: greatest torque of the record.
+    """
+
+    def __init__(
+        self,
+        recorded: RecordedExperiment,
+        simulator: Simulator,
+        noise_std: np.ndarray,
+        nominal: Mapping[str, float],
+        train: Sequence[int],
+        held: Sequence[int],
+        tolerance: float = TOLERANCE,
+    ) -> None:
+        """Prepare.
+
+        Args:
+            recorded: the experiment.
+            simulator: repeats it.
+            noise_std: `NoiseLevels.of_outputs`, (realizations, outputs, lines), rad.
+            nominal: datasheet values of the base parameters.
+            train: realizations to fit.
+            held: realizations to judge by.
+            tolerance: how far a datasheet value may be off, relative.
+        """
+        self.recorded, self._simulator = recorded, simulator
+        self._levels = [realization.level for realization in recorded.realizations]
+        self._misfit = lambda which: Misfit(recorded, simulator, noise_std, which)
+        self.nominal = dict(nominal)
+        self.tolerance = tolerance
+        self.train = Misfit(recorded, simulator, noise_std, train)
+        self.held = Misfit(recorded, simulator, noise_std, held)
+        self.peak_torque_nm = max(float(np.abs(r.torque).max()) for r in recorded.realizations)
+
+    @property
+    def catalogue(self) -> list[str]:
+        """Effects that this rig can have: a rigid axis has none of transmission and link."""
+        rigid = "k0" not in self.nominal
+        return [
+            effect.identifier
+            for effect in fx.CATALOGUE
+            if effect.starts and (effect.on_rigid_axis or not rigid)
+        ]
+
+    def refit(self) -> Fit:
+        """Fit the base parameters alone, level after level added from the lowest amplitude up.
+
+        At a large amplitude a loop near its stability margin answers erratically to a parameter
+        that is off; the low ones bring it near first.
+        """
+        space = Space(self.nominal, (), (), self.tolerance)
+        x = np.zeros(len(self.nominal))
+        levels = sorted({self._levels[i] for i in self.train.which})
+        for highest in levels[:-1]:
+            misfit = self._misfit([i for i in self.train.which if self._levels[i] <= highest])
+            x = self._reached(space, x, misfit, _FIRST_STEPS).x
+        return self.solve((), space, x)
+
+    def across_levels(self, fit: Fit) -> float | None:
+        """Return how well an explanation predicts an amplitude that it has not seen.
+
+        For each level the fit is continued on the training data of the other levels, and judged on
+        all realizations of that one.
+
+        Returns:
+            chi-square per degree of freedom, geometric mean over levels; None with one level.
+        """
+        levels = sorted(set(self._levels))
+        if len(levels) < 2:
+            return None
+        values = []
+        for level in levels:
+            others = [i for i in self.train.which if self._levels[i] != level]
+            seen, unseen = (
+                self._misfit(others),
+                self._misfit([i for i, at in enumerate(self._levels) if at == level]),
+            )
+            known = self._rows(fit, others)
+            reached = self._reached(fit.space, fit.solution.x, seen, _NESTED_STEPS, known)
+            values.append(unseen.chi2(fit.space.model(reached.x)))
+        return float(np.exp(np.mean(np.log(np.maximum(values, 1e-3)))))
+
+    def _rows(self, fit: Fit, which: Sequence[int]) -> np.ndarray:
+        """Return the rows of a fit's Jacobian that belong to some of the training realizations."""
+        jacobian = fit.solution.jacobian
+        by_realization = jacobian.reshape(len(self.train.which), -1, jacobian.shape[1])
+        chosen = by_realization[[self.train.which.index(i) for i in which]]
+        return chosen.reshape(-1, jacobian.shape[1])
+
+    def _reached(
+        self, space: Space, x: np.ndarray, misfit: Misfit, steps: int, known=None
+    ) -> Solution:
+        """Return where a few steps lead on some of the realizations."""
+
+        def residuals(points: np.ndarray) -> np.ndarray:
+            return misfit.errors([space.model(point) for point in points])
+
+        return solve(residuals, x, *space.bounds(), most_steps=steps, known=known)
+
+    def screening(self, parent: Fit, effect: str) -> Screening:
+        """Return what the starts of an effect promise beside a fit."""
+        cycles = None
+        if fx.EFFECTS[effect].ripple and self.recorded.repeatable:
+            cycles = self.ripples(effect, parent).cycles(RIPPLES_TRIED)
+        return Screening(
+            parent.solution,
+            parent.model,
+            starts(effect, self.peak_torque_nm, cycles),
+            partial(self.space, parent),
+            self.errors,
+        )
+
+    def ripples(self, effect: str, parent: Fit) -> RippleSearch:
+        """Return what ripples of an effect could do about the errors that a fit leaves."""
+        return RippleSearch(
+            effect, self.recorded, self._simulator, self.train, parent.model, parent.solution
+        )
+
+    def space(self, parent: Fit, seed: Mapping[str, float]) -> Space:
+        """Return the space of a fit with the parameters of a seed free as well."""
+        added = space_for(self.nominal, seed)
+        return Space(
+            self.nominal,
+            parent.space.effects + added.effects,
+            parent.space.units + added.units,
+            self.tolerance,
+        )
+
+    def errors(self, models: Sequence[Model]) -> np.ndarray:
+        """Return the training error vectors of models, float64 (models, errors)."""
+        return self.train.errors(models)
+
+    def add(
+        self,
+        parent: Fit,
+        effect: str,
+        proposals: Sequence[Proposal],
+        give_up_above: float | None = None,
+    ) -> Fit:
+        """Fit a parent's explanation with one effect more, from its most promising starts.
+
+        Args:
+            parent: the explanation to extend.
+            effect: identifier of the effect to add.
+            proposals: from `screening(parent, effect)`.
+            give_up_above: training chi-square above which a fit is not pursued.
+
+        Returns:
+            the best fit; it is never worse than the parent, which it contains.
+        """
+        names = tuple(sorted((*parent.effects, effect)))
+        if proposals[0][0] > NO_PROMISE * parent.train_chi2:
+            return self._without_promise(parent, effect, names, proposals[0], give_up_above)
+        fits: list[Fit] = []
+        for _, space, point in _different(proposals, _KEPT_STARTS):
+            limit = give_up_above
+            fits.append(self.solve(names, space, point, limit, known=parent.solution.jacobian))
+            rival = _RIVAL * fits[-1].train_chi2
+            give_up_above = rival if limit is None else min(limit, rival)
+        return min(fits, key=lambda fit: (not fit.converged, fit.train_chi2))
+
+    def continued(self, fit: Fit) -> Fit:
+        """Return a fit that has not converged, taken further from where it stands."""
+        return self.solve(
+            fit.effects, fit.space, fit.solution.x, most_steps=MORE_STEPS,
+            known=fit.solution.jacobian,
+        )  # fmt: skip
+
+    def _without_promise(
+        self,
+        parent: Fit,
+        effect: str,
+        names: tuple[str, ...],
+        proposal: Proposal,
+        give_up_above: float | None,
+    ) -> Fit:
+        """Return the parent with next to nothing of the effect, never worse than the parent.
+
+        No start gained anything; if a step from there gains nothing either, this is where the
+        effect ends, as converged as the parent.
+        """
+        cost, space, start = proposal
+        if cost > parent.train_chi2:
+            seed = dict.fromkeys(fx.EFFECTS[effect].names, 0.0)
+            seed.update(starts(effect, self.peak_torque_nm)[0])
+            space = self.space(parent, seed)
+            start = np.clip(space.point(parent.model), *space.bounds())
+        fit = self.solve(names, space, start, most_steps=1, known=parent.solution.jacobian)
+        if fit.train_chi2 < NO_PROMISE * parent.train_chi2:
+            known = fit.solution.jacobian
+            return self.solve(names, space, fit.solution.x, give_up_above, known=known)
+        return replace(fit, solution=replace(fit.solution, converged=parent.converged))
+
+    def solve(
+        self,
+        effects: tuple[str, ...],
+        space: Space,
+        start: np.ndarray,
+        give_up_above: float | None = None,
+        most_steps: int = _MOST_STEPS,
+        known: np.ndarray | None = None,
+    ) -> Fit:
+        """Return the fit of effects from a start; its other arguments are those of `solve`."""
+        low, high = space.bounds()
+
+        def residuals(points: np.ndarray) -> np.ndarray:
+            return self.errors([space.model(point) for point in points])
+
+        solution = solve(
+            residuals, start, low, high,
+            most_steps=most_steps, give_up_above=give_up_above, known=known,
+        )  # fmt: skip
+        model = space.model(solution.x)
+        held = self.held.errors([model])[0]
+        return Fit(effects, model, space, solution, solution.cost, float(held @ held))
+
+
+def _different(proposals: Sequence[Proposal], most: int) -> list[Proposal]:
+    """Return the best proposals that differ by more than a size, at the most `most`."""
+    kept: list[Proposal] = []
+    for proposal in proposals:
+        if all(proposal[1] is not other[1] for other in kept):
+            kept.append(proposal)
+        if len(kept) == most:
+            break
+    return kept

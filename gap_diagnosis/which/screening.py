@@ -1,0 +1,203 @@
+"""Where to start fitting an effect: every seed tried alone, the best of them scaled and combined.
+
+A seed is a small effect of one shape. Where it should go, with the base parameters following, is
+predicted linearly (score test with the parent's Jacobian); the prediction is then tried at several
+sizes, and the seed with the parameters as they are, because neither smallness nor linearity can be
+relied on. Seeds that differ only in a phase by a quarter turn span all phases: their best
+combination is a seed of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fjr_sim_node import effects as fx
+
+from ..model.simulated_rig import Model
+from .least_squares import Solution
+from .search_space import Space, beside
+
+_SIZES = (0.1, 0.3, 3.0)  # of the size that the linear prediction asks for, tried after that
+_TRIED = 6
+_SCALED = 2
+_FOLLOW = 0.1  # how far a parameter of the parent may follow, relative
+
+Errors = Callable[[Sequence[Model]], np.ndarray]
+Proposal = tuple[float, Space, np.ndarray]
+"""A starting point: what it costs, the space it lies in, the point."""
+
+
+@dataclass(frozen=True)
+class _Candidate:
+    """A seed, how it changes the errors, its linearly best size and what that would gain."""
+
+    seed: Mapping[str, float]
+    change: np.ndarray
+    size: float
+    gain: float
+
+
+class Screening:
+    """The seeds of one effect beside a fit: what each promises, and starting points from them."""
+
+    def __init__(
+        self,
+        parent: Solution,
+        model: Model,
+        seeds: Sequence[Mapping[str, float]],
+        space_of: Callable[[Mapping[str, float]], Space],
+        errors: Errors,
+    ) -> None:
+        """Evaluate all seeds once.
+
+        Args:
+            parent: where the parent's fit ended.
+            model: the parent's model.
+            seeds: starting values of the effect's parameters by full name.
+            space_of: the space in which a seed is fitted.
+            errors: error vectors of models, as the parent's residuals.
+        """
+        changes = errors([beside(model, seed) for seed in seeds]) - parent.residuals
+        inverse = np.linalg.pinv(parent.jacobian, rcond=1e-6)
+        own = changes - (changes @ inverse.T) @ parent.jacobian.T
+        found = _candidates(parent, seeds, changes, own)
+        self._candidates = sorted(found, key=lambda candidate: -candidate.gain)
+        self._tries = _Tries(parent, model, inverse, space_of, errors)
+
+    @property
+    def gain(self) -> float:
+        """By how much the best seed would lower the parent's cost, predicted linearly."""
+        return self._candidates[0].gain
+
+    def proposals(self) -> list[Proposal]:
+        """Return starting points, tried at several sizes, the most promising first.
+
+        Returns:
+            (cost, space, point), ascending in cost.
+        """
+        chosen = self._candidates[:_TRIED]
+        self._tries.run([(c, size) for c in chosen for size in sorted({c.size, 1.0})])
+        self._tries.run([(c, 1.0) for c in chosen], follow=False)
+        best = self._tries.best(_SCALED)
+        self._tries.run([(c, c.size * factor) for c in best for factor in _SIZES])
+        return self._tries.proposals()
+
+
+class _Tries:
+    """Candidates tried at several sizes."""
+
+    def __init__(
+        self,
+        parent: Solution,
+        model: Model,
+        inverse: np.ndarray,
+        space_of: Callable[[Mapping[str, float]], Space],
+        errors: Errors,
+    ) -> None:
+        self._parent, self._model, self._inverse = parent, model, inverse
+        self._space_of, self._errors = space_of, errors
+        self._spaces: dict[int, Space] = {}
+        self._found: list[tuple[float, _Candidate, np.ndarray]] = []
+
+    def run(self, tries: Sequence[tuple[_Candidate, float]], follow: bool = True) -> None:
+        """Evaluate candidates at sizes, the base parameters following or as they were."""
+        tries = [(c, size) for c, size in tries if 1e-3 < abs(size) < 30.0]
+        if not tries:
+            return
+        points = [self._point(candidate, size, follow) for candidate, size in tries]
+        trials = self._errors(
+            [self._space(c).model(p) for (c, _), p in zip(tries, points, strict=True)]
+        )
+        costs = np.einsum("ij,ij->i", trials, trials)
+        for (candidate, _), point, cost in zip(tries, points, costs, strict=True):
+            self._found.append((float(cost), candidate, point))
+        self._found.sort(key=lambda one: one[0])
+
+    def best(self, most: int) -> list[_Candidate]:
+        """Return the candidates that did best so far."""
+        order = {id(c): c for _, c, _ in self._found}
+        return list(order.values())[:most]
+
+    def proposals(self) -> list[Proposal]:
+        """Return all that was tried, ascending in cost."""
+        return [(cost, self._space(c), point) for cost, c, point in self._found]
+
+    def _space(self, candidate: _Candidate) -> Space:
+        if id(candidate) not in self._spaces:
+            self._spaces[id(candidate)] = self._space_of(candidate.seed)
+        return self._spaces[id(candidate)]
+
+    def _point(self, candidate: _Candidate, size: float, follow: bool) -> np.ndarray:
+        """Return the seed with its sizes scaled and, if they follow, the parent's parameters."""
+        space, parents = self._space(candidate), self._parent.x.size
+        seed = {n: v * size if _scales(n) else v for n, v in candidate.seed.items()}
+        point = space.point(beside(self._model, seed))
+        if follow:
+            step = self._inverse @ -(self._parent.residuals + size * candidate.change)
+            point[:parents] += np.clip(step, -_FOLLOW, _FOLLOW)
+        return np.clip(point, *space.bounds())
+
+
+def _candidates(
+    parent: Solution,
+    seeds: Sequence[Mapping[str, float]],
+    changes: np.ndarray,
+    own: np.ndarray,
+) -> list[_Candidate]:
+    """Return one candidate for each seed, or for each pair of seeds a quarter turn apart.
+
+    `own` is what the base parameters can't follow of `changes`.
+    """
+    found = []
+    for members in _by_shape(seeds).values():
+        weights, *_ = np.linalg.lstsq(own[members].T, -parent.residuals, rcond=1e-9)
+        gain = -float(weights @ (own[members] @ parent.residuals))
+        if len(members) == 1:
+            seed, size = seeds[members[0]], float(weights[0])
+            if not any(map(_scales, seed)):
+                after = parent.residuals + own[members[0]]
+                size, gain = 1.0, parent.cost - float(after @ after)
+            elif size < 0.0 and not _may_be_negative(seed):
+                size, gain = 1.0, 0.0
+            found.append(_Candidate(seed, changes[members[0]], size, gain))
+            continue
+        size = float(np.hypot(*weights)) or 1.0
+        name = _phase_name(seeds[members[0]])
+        assert name is not None  # two seeds of one shape differ in it
+        phase = {name: float(np.arctan2(weights[1], weights[0]))}
+        change = (weights @ changes[members]) / size
+        found.append(_Candidate({**seeds[members[0]], **phase}, change, size, gain))
+    return found
+
+
+def _by_shape(seeds: Sequence[Mapping[str, float]]) -> dict[tuple, list[int]]:
+    """Group seeds that differ only in the phases 0 and a quarter turn, in this order."""
+    groups: dict[tuple, list[int]] = {}
+    for index, seed in enumerate(seeds):
+        phase = _phase_name(seed)
+        quarter = phase is not None and seed[phase] in (0.0, np.pi / 2)
+        key = tuple((n, v) for n, v in seed.items() if not (quarter and n == phase))
+        groups.setdefault((key, None if quarter else index), []).append(index)
+    return groups
+
+
+def _phase_name(seed: Mapping[str, float]) -> str | None:
+    names = [name for name in seed if fx.parameter(name).role == "angle"]
+    return names[0] if names else None
+
+
+def _may_be_negative(seed: Mapping[str, float]) -> bool:
+    return all(fx.parameter(name).may_be_negative for name in seed if is_size(name))
+
+
+def _scales(name: str) -> bool:
+    """Tell whether what an effect does grows with a parameter, by its full name."""
+    return fx.parameter(name).role in ("size", "harmonic")
+
+
+def is_size(name: str) -> bool:
+    """Tell whether a parameter, by its full name, switches its effect or a part of it."""
+    return fx.parameter(name).role in ("size", "limit", "harmonic")

@@ -1,0 +1,299 @@
+"""The search: the refit first, then single effects, then combinations, ranked on held-out data.
+
+Every candidate is fitted in closed loop with all base parameters free. Candidates are ranked by the
+chi-square per degree of freedom on realizations that the fit has not seen, and, where it matters,
+on an amplitude that it has not seen.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from fjr_sim_node import effects as fx
+
+from .attribution import (
+    CERTAIN,
+    NOTHING_LEFT,
+    PLAIN,
+    SECOND_GAIN,
+    SMALL_GAIN,
+    STANDS_OUT,
+    Attribution,
+    stands_out,
+    tie_limit,
+)
+from .estimates import sure
+from .fits import Fit, Fitter
+from .harmonics import with_second_harmonics
+from .reduced_fits import without, without_scale
+
+SCALES = tuple(effect.identifier for effect in fx.CATALOGUE if effect.scales)
+"""Effects that scale the base parameters: a gain of the torque does nothing else, and is no second
+cause whatever it gains; an eccentric encoder has a gain about its zero, and may do more."""
+
+_FINALISTS = 4
+_CLOSE = 2.0
+_GIVE_UP = 4.0
+_NEAR = 10.0
+_ALIKE = 1.3  # near equivalents that fit worse than this are looked for again from each other
+_WORTH_A_PAIR = 2.0
+_WORTH_A_HARMONIC = 1.3
+_SECOND_PROMISE = 1.2  # a second effect that has not gained that much after a few steps is dropped
+_PROMISING_SECONDS = 5
+_PROMISING_PARTNERS = 2
+_SCREENED = 2  # times as many are tried at several sizes as are fitted
+
+Progress = Callable[[str], None]
+
+
+def _partners(found: Sequence[str], among: set[str]) -> list[str]:
+    """Return the near equivalents of effects, so that a set is never short of one not tried."""
+    alike = {other for effect in found for other in fx.near_equivalents(effect)} | set(found)
+    return sorted(among & alike)
+
+
+def _stands_for(effects: Sequence[str], others: Sequence[str]) -> bool:
+    """Tell whether explanations differ by one effect and a near equivalent of it."""
+    mine, theirs = set(effects) - set(others), set(others) - set(effects)
+    return len(mine) == 1 and bool(_partners(sorted(theirs), mine))
+
+
+class Search:
+    """The search over explanations of one experiment."""
+
+    def __init__(self, fitter: Fitter, progress: Progress = lambda _: None) -> None:
+        """Take the fitter of the experiment."""
+        self._fitter = fitter
+        self._progress = progress
+        self._fits: dict[tuple[str, ...], Fit] = {}
+        self._refit: Fit | None = None
+        self._groups = fitter.train.groups()
+
+    def misfit(self, fit: Fit) -> float:
+        """Return the chi-square per degree of freedom of a fit over held-out realizations."""
+        return fit.held_chi2 / self._fitter.held.size
+
+    def _best(self, count: int) -> Fit | None:
+        """Return the best explanation of `count` effects; None if none has converged.
+
+        Among those that are close on held-out realizations, the prediction of an amplitude that the
+        fit has not seen decides with the same weight; among those that can't be told apart, the one
+        with the fewest parameters. What cannot be told from zero has no name.
+        """
+        ranked = self._sure(count)
+        close = [f for f in ranked[:_FINALISTS] if self.misfit(f) < _CLOSE * self.misfit(ranked[0])]
+        if len(close) < 2:
+            return ranked[0] if ranked else None
+        scores = []
+        for fit in close:
+            self._progress(f"{' + '.join(fit.effects)} on unseen amplitudes")
+            amplitudes = self._fitter.across_levels(fit)
+            scores.append(self.misfit(fit) * (1.0 if amplitudes is None else amplitudes))
+        best = close[scores.index(min(scores))]
+        tied = [best, *self._tied(best)]
+        return min(tied, key=lambda fit: (len(fit.space.effects), self.misfit(fit)))
+
+    def run(self) -> Attribution:
+        """Search and judge."""
+        self._progress("refit of the base parameters")
+        refit = self._refit = self._fitter.refit()
+        self._extend(refit, self._fitter.catalogue)
+        best = refit
+        self._polish(1)
+        self._enrich(1)
+        single = self._sure(1)
+        if single and self._calls_for(refit, single[0], SMALL_GAIN):
+            best = self._best(self._effects_needed(single[0])) or single[0]
+        return Attribution(
+            refit, self._all_ranked(), best, self._tied(best), self._explains(refit, best)
+        )
+
+    def _extend(
+        self,
+        parent: Fit,
+        effects: Sequence[str],
+        most: int | None = None,
+        near: float = _NEAR,
+    ) -> None:
+        """Fit the parent with each effect more, in the order of what their starts achieve.
+
+        Args:
+            parent: the explanation to extend.
+            effects: identifiers to add, one at a time.
+            most: how many of them to pursue; None for all.
+            near: how many times the best chi-square a converged fit may have to be left alone.
+        """
+        rivals = [fit.train_chi2 for fit in self._ranked(len(parent.effects) + 1)]
+        least = min(parent.train_chi2, *rivals) if rivals else parent.train_chi2
+        settled = self._settled(len(parent.effects) + 1, near)
+        effects = [e for e in effects if tuple(sorted((*parent.effects, e))) not in settled]
+        screened = {effect: self._fitter.screening(parent, effect) for effect in effects}
+        hopeful = sorted(effects, key=lambda effect: -screened[effect].gain)
+        if most is not None:
+            hopeful = hopeful[: _SCREENED * most]
+        proposals = {effect: screened[effect].proposals() for effect in hopeful}
+        ordered = sorted(hopeful, key=lambda effect: proposals[effect][0][0])[:most]
+        for partner in _partners(ordered[:_PROMISING_PARTNERS], set(effects) - set(ordered)):
+            proposals.setdefault(partner, screened[partner].proposals())
+            ordered.append(partner)
+        for number, effect in enumerate(ordered, 1):
+            name = " + ".join((*parent.effects, effect))
+            self._progress(f"{name} ({number} of {len(ordered)})")
+            limit = _GIVE_UP * max(least, self._fitter.train.size)
+            if most is not None:
+                limit = min(limit, parent.train_chi2 / _SECOND_PROMISE)
+            fit = self._fitter.add(parent, effect, proposals[effect], limit)
+            key = fit.effects
+            if key not in self._fits or fit.train_chi2 < self._fits[key].train_chi2:
+                self._fits[key] = fit
+            least = min(least, fit.train_chi2)
+
+    def _enrich(self, count: int) -> None:
+        """Give second harmonics to the ripples of the explanations that are near the best."""
+        ranked = self._ranked(count)
+        for fit in ranked[:_FINALISTS]:
+            near = self.misfit(fit) < _CLOSE * self.misfit(ranked[0])
+            ripples = any(fx.EFFECTS[effect].ripple for effect in fit.effects)
+            if near and ripples and self.misfit(fit) > _WORTH_A_HARMONIC:
+                self._progress(f"{' + '.join(fit.effects)}, second harmonic")
+                self._fits[fit.effects] = with_second_harmonics(self._fitter, fit)
+
+    def _ranked(self, count: int) -> list[Fit]:
+        """Return the converged fits of `count` effects, best first."""
+        fits = [fit for fit in self._fits.values() if len(fit.effects) == count and fit.converged]
+        return sorted(fits, key=self.misfit)
+
+    def _sure(self, count: int) -> list[Fit]:
+        """Return the converged fits of `count` effects none of which could be zero, best first."""
+        for effects, fit in self._fits.items():
+            if len(effects) == count:
+                self._fits[effects] = replace(fit, without=self._without(effects))
+        return [fit for fit in self._ranked(count) if sure(fit, self._groups)]
+
+    def _without(self, effects: Sequence[str]) -> dict[str, float]:
+        """Return the training chi-square of the fits that lack one of some effects."""
+        found = {}
+        for effect in effects:
+            rest = tuple(other for other in effects if other != effect)
+            fit = self._fits.get(rest) if rest else self._refit
+            if fit is not None and fit.converged:
+                found[effect] = fit.train_chi2
+        return found
+
+    def _all_ranked(self) -> tuple[Fit, ...]:
+        ordered = sorted(self._fits.values(), key=lambda fit: (not fit.converged, self.misfit(fit)))
+        return tuple(ordered)
+
+    def _calls_for(self, simple: Fit, rich: Fit, gain: float) -> bool:
+        """Whether the richer explanation is worth its effect: a gain on held-out data.
+
+        What gains on held-out data alone has only happened to extrapolate better.
+        """
+        before, after = self.misfit(simple), self.misfit(rich)
+        certain = before - after > CERTAIN / self._fitter.held.size
+        return certain and min(before / after, simple.train_chi2 / rich.train_chi2) > gain
+
+    def _explains(self, refit: Fit, best: Fit) -> bool:
+        left = self.misfit(best)
+        if not best.effects:
+            return left < PLAIN
+        if left < NOTHING_LEFT:
+            return True
+        return stands_out(left, self.misfit(refit), self._next(refit, best)) > STANDS_OUT
+
+    def _next(self, refit: Fit, best: Fit) -> float:
+        """Return the misfit of the best explanation that does not stand for the chosen one.
+
+        A fit that was given up counts as well: it could only have become better.
+        """
+        alike = {*best.effects, *_partners(best.effects, set(self._fitter.catalogue))}
+        others = [
+            fit
+            for fit in self._fits.values()
+            if len(fit.effects) == len(best.effects) and not set(fit.effects) <= alike
+        ]
+        return min(self.misfit(fit) for fit in (refit, *others))
+
+    def _effects_needed(self, best: Fit) -> int:
+        """Search forward, backward and by swaps for a second effect; return how many to name."""
+        if self.misfit(best) < _WORTH_A_PAIR:
+            return 1
+        for parent in self._ranked(1)[:2]:
+            if self.misfit(parent) < _NEAR * self.misfit(best):
+                others = [e for e in self._fitter.catalogue if e not in parent.effects]
+                self._extend(parent, others, _PROMISING_SECONDS)
+            if any(self.misfit(pair) < NOTHING_LEFT for pair in self._ranked(2)):
+                break
+        self._swap(best)
+        self._polish(2)
+        self._enrich(2)
+        if self._pair_called_for(best, self._ranked(2)):
+            self._drop_scales()
+            best = self._sure(1)[0]
+        return 2 if self._pair_called_for(best, self._sure(2)) else 1
+
+    def _pair_called_for(self, best: Fit, pairs: Sequence[Fit]) -> bool:
+        return bool(pairs) and self._calls_for(best, pairs[0], SECOND_GAIN)
+
+    def _drop_scales(self) -> None:
+        """Drop pairs, near the best, in which one effect does no more than scale the parameters.
+
+        Such an effect lifts the bounds of the parameters beside the other one. So that one is
+        fitted alone without those bounds; where it then does as well, it is the only cause.
+        """
+        tested: set[tuple[str, ...]] = set()
+        while True:
+            pairs = self._ranked(2)
+            near = [fit for fit in pairs if self.misfit(fit) < _CLOSE * self.misfit(pairs[0])]
+            left = [f for f in near if f.effects not in tested and set(f.effects) & set(SCALES)]
+            if not left:
+                return
+            pair = left[0]
+            tested.add(pair.effects)
+            scale = next(effect for effect in SCALES if effect in pair.effects)
+            self._progress(f"{' + '.join(pair.effects)}, parameters scaled instead")
+            alone = without_scale(self._fitter, pair, scale)
+            if alone.converged and alone.train_chi2 < self._fits[alone.effects].train_chi2:
+                self._fits[alone.effects] = alone
+            if scale == "torque_gain" or not self._calls_for(alone, pair, SECOND_GAIN):
+                del self._fits[pair.effects]
+
+    def _swap(self, best: Fit) -> None:
+        """Fit the best pair with each member replaced by its near equivalents."""
+        pairs = self._ranked(2)
+        if not pairs or not self._calls_for(best, pairs[0], SECOND_GAIN):
+            return
+        for kept, swapped in (pairs[0].effects, pairs[0].effects[::-1]):
+            partners = _partners([swapped], set(self._fitter.catalogue) - {kept, swapped})
+            if partners:
+                self._extend(without(self._fitter, pairs[0], swapped), partners, near=_ALIKE)
+
+    def _settled(self, count: int, near: float) -> set[tuple[str, ...]]:
+        """Return which explanations of `count` effects another start could not help."""
+        ranked = self._ranked(count)
+        best = min((fit.train_chi2 for fit in ranked), default=math.inf)
+        return {fit.effects for fit in ranked if fit.train_chi2 < near * best}
+
+    def _polish(self, count: int) -> None:
+        """Take fits further that have not converged but would lead, or stand for what leads."""
+        ranked = self._ranked(count)
+        best = min((fit.train_chi2 for fit in ranked), default=math.inf)
+        for effects, fit in list(self._fits.items()):
+            stands = ranked and _stands_for(effects, ranked[0].effects)
+            limit = _NEAR * best if stands else best
+            if len(effects) == count and not fit.converged and fit.train_chi2 < limit:
+                self._progress(f"{' + '.join(effects)}, further")
+                self._fits[effects] = self._fitter.continued(fit)
+
+    def _tied(self, best: Fit) -> tuple[Fit, ...]:
+        """Return the converged explanations of as many effects that do as well as the best."""
+        if not best.effects:
+            return ()
+        limit = tie_limit(self.misfit(best), self._fitter.held.size)
+        return tuple(
+            fit
+            for fit in self._sure(len(best.effects))
+            if fit.effects != best.effects and self.misfit(fit) < limit
+        )

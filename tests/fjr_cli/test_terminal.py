@@ -1,0 +1,107 @@
+"""What commands print on narrow terminals: every number whole."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+from synthetic_result import make_result
+
+from bla_analyzer.results.summary import summarize
+from fjr_bringup.replay.comparison import Difference
+from fjr_bringup.replay.publishing import Published, PublishedTopic
+from fjr_cli import analysis_summary, diagnosis_summary
+from fjr_cli.replay_summary import print_differences, print_published
+from gap_diagnosis.outcome.diagnosis import (
+    Candidate,
+    Diagnosis,
+    Estimate,
+    Figure,
+    Gap,
+    GapFigures,
+    Gaps,
+    StageFigures,
+)
+
+WIDTHS = (40, 60, 80)
+
+
+@pytest.fixture(params=WIDTHS)
+def console(request) -> Console:
+    return Console(width=request.param, file=io.StringIO(), force_terminal=False)
+
+
+def printed(console: Console) -> str:
+    text = console.file.getvalue()
+    assert "\N{HORIZONTAL ELLIPSIS}" not in text
+    assert max(map(len, text.splitlines())) <= console.width
+    return text
+
+
+def test_analyze_cuts_no_number(console):
+    result = make_result()
+    analysis_summary.print_summary(result, console)
+    words = printed(console).split()
+    for level in result.levels:
+        n = summarize(level)
+        for db in (n.linear_db, n.odd_db, n.even_db, n.noise_db):
+            assert f"{db:.1f}" in words
+        for comparison in level.comparisons:
+            assert f"{comparison.v_mean:.3g}" in words
+
+
+def test_diagnose_cuts_no_number_and_says_the_share_as_a_sentence(console):
+    names = ["piecewise_stiffness.soft_ratio", "backlash.half_gap_rad"]
+    effects = ["piecewise_stiffness", "backlash"]
+    figure = Figure(value=0.987, low=0.981, high=0.993)
+    stage = StageFigures(nominal=None, refit=None, explained=None, noise_floor=None, closed=figure)
+    ranked = Candidate(
+        effects=effects, held_out_chi2=123.4, delta=1.0, converged=True, parameters={}
+    )
+    diagnosis = Diagnosis(
+        verdict="ambiguous",
+        effects=effects,
+        confidence=0.5,
+        gap=Gaps(
+            nominal=Gap(nrmse_position=0.2345, nrmse_torque=0.3456, chi2_per_dof=2.91e4),
+            refit=Gap(nrmse_position=0.0567, nrmse_torque=0.0678, chi2_per_dof=1.91e3),
+            explained=Gap(nrmse_position=0.00123, nrmse_torque=0.000681, chi2_per_dof=0.662),
+            noise_floor=Gap(nrmse_position=0.00124, nrmse_torque=0.000696, chi2_per_dof=1.0),
+        ),
+        gap_closed=0.987,
+        gap_figures=GapFigures(position=stage, torque=stage, bla_sigma=stage, distortion_db=stage),
+        ranking=[ranked],
+        parameters={name: Estimate(value=0.6543, low=0.6521, high=0.6565) for name in names},
+    )
+    diagnosis_summary.print_summary(diagnosis, console, Path("out"))
+    text = printed(console)
+    words = text.split()
+    for number in ("23.4", "34.6", "2.91e+04", "0.123", "0.0681", "0.662", "123"):
+        assert number in words, number
+    for name in (*names, "0.6543", "0.6521", "0.6565"):
+        assert name in text
+    [share] = [line for line in text.splitlines() if "98.7%" in line]
+    assert share.startswith("98.7% of what the refit left is")
+
+
+def test_replay_cuts_no_number(console):
+    difference = Difference(
+        unit="N m",
+        played_anew=True,
+        samples=20000,
+        different=17,
+        first_different=12345,
+        rms_recorded=1.234e-3,
+        mean=1e-9,
+        rms=5.678e-7,
+        worst=9.012e-6,
+        worst_sample=12346,
+    )
+    print_differences({"torque": difference}, console)
+    line = PublishedTopic("/rig/motor_position", 1234567, "reliable, volatile, depth 100", 12)
+    print_published(Published((line,), 1.0, 2.0, None), console)
+    text = printed(console)
+    for word in ("0.001234", "5.678e-07", "9.012e-06", "12346", line.topic, "1234567"):
+        assert word in text.split(), word

@@ -1,0 +1,197 @@
+"""Every format in the forms in which loggers write it, and each broken in each way."""
+
+from __future__ import annotations
+
+import gzip
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.io import savemat
+
+from fjr_kit.errors import InputError
+from fjr_records.importers.columns import READERS, read_columns
+
+T = np.arange(40) / 100.0
+R, Y = np.sin(7 * T), 0.5 * np.sin(7 * T - 0.3)
+ROWS = list(zip(T.tolist(), R.tolist(), Y.tolist(), strict=True))
+
+
+def table(delimiter: str, comma: bool = False, end: str = "\n", after: str = "") -> str:
+    lines = (delimiter.join(map(repr, row)) + after for row in ROWS)
+    text = end.join(lines) + end
+    return text.replace(".", ",") if comma else text
+
+
+TEXTS = {
+    "names.csv": ("t,r,y\n" + table(","), "ry"),
+    "none.csv": (table(","), "12"),
+    "none_by_bracket.csv": (table(","), ("[1]", "[2]")),
+    "names_by_number.csv": ("t,r,y\n" + table(","), "12"),
+    "units.csv": ("t,r,y\ns,rad,rad\n" + table(","), "ry"),
+    "title.csv": ("Bench 3, run of Monday\nt,r,y\n" + table(","), "ry"),
+    "comments.csv": ("# bench 3\n# second line, too\nt,r,y\n" + table(",") + "# end\n", "ry"),
+    "commented_names.txt": ("# t r y\n" + table(" "), "ry"),
+    "decimal_comma.csv": ("t;r;y\n" + table(";", comma=True), "ry"),
+    "decimal_comma_tabs.tsv": ("t\tr\ty\n" + table("\t", comma=True), "ry"),
+    "decimal_comma_spaces.txt": (table("  ", comma=True), "12"),
+    "spaces.dat": ("  t   r  y\n" + table("   "), "ry"),
+    "windows.csv": ("t,r,y\r\n" + table(",", end="\r\n"), "ry"),
+    "closing_delimiter.csv": ("t,r,y,\n" + table(",", after=","), "ry"),
+    "quoted.csv": ('"t","r, set","y"\n' + table(","), ("r, set", "y")),
+    "bars.txt": ("t | r | y\n" + table(" | "), "ry"),
+    "blank_lines.csv": ("\n\nt,r,y\n\n" + table(",").replace("\n", "\n\n"), "ry"),
+    "packed.txt.gz": ("Time, Goal Angle, y\n" + table(", "), ("Goal Angle", "y")),
+}
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_text(tmp_path, name):
+    text, names = TEXTS[name]
+    write = gzip.compress if name.endswith(".gz") else bytes
+    (tmp_path / name).write_bytes(write(text.encode()))
+    for found, expected in zip(
+        read_columns(tmp_path / name, list(names)).values(), (R, Y), strict=True
+    ):
+        np.testing.assert_array_equal(found, expected)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "latin-1"])
+def test_names_in_any_encoding(tmp_path, encoding):
+    (tmp_path / "rig.csv").write_bytes(("t,µ (°),y\n" + table(",")).encode(encoding))
+    np.testing.assert_array_equal(read_columns(tmp_path / "rig.csv", ["µ (°)"])["µ (°)"], R)
+
+
+JSONS = {
+    "entries": ({"kp": 4, "entries": [{"r": r, "y": y} for _, r, y in ROWS]}, "entries.{}"),
+    "deep": ({"a": {"log": [{"q": {"r": r, "y": y}} for _, r, y in ROWS]}}, "a.log.q.{}"),
+    "list": ([{"r": r, "y": y} for _, r, y in ROWS], "{}"),
+    "lists": ({"log": {"r": R.tolist(), "y": Y.tolist()}}, "log.{}"),
+}
+
+
+@pytest.mark.parametrize("name", JSONS)
+@pytest.mark.parametrize("suffix", [".json", ".json.gz"])
+def test_json(tmp_path, name, suffix):
+    content, path = JSONS[name]
+    packed = gzip.compress if suffix.endswith(".gz") else bytes
+    (tmp_path / f"log{suffix}").write_bytes(packed(json.dumps(content).encode()))
+    names = [path.format(each) for each in "ry"]
+    found = read_columns(tmp_path / f"log{suffix}", names)
+    np.testing.assert_array_equal(list(found.values()), [R, Y])
+    with pytest.raises(InputError, match=rf"there is no speed; the file holds .*{names[0]}"):
+        read_columns(tmp_path / f"log{suffix}", ["speed"])
+
+
+def test_json_of_rows_and_of_lines(tmp_path):
+    (tmp_path / "rows.json").write_text(json.dumps({"data": ROWS}))
+    np.testing.assert_array_equal(read_columns(tmp_path / "rows.json", ["data[2]"])["data[2]"], Y)
+    lines = "\n".join(json.dumps({"t": t, "y": y}) for t, _, y in ROWS)
+    (tmp_path / "log.jsonl").write_text(lines)
+    np.testing.assert_array_equal(read_columns(tmp_path / "log.jsonl", ["y"])["y"], Y)
+
+
+def test_mat_with_signals_in_rows(tmp_path):
+    savemat(tmp_path / "rig.mat", {"rec": {"pos": np.stack([R, Y]), "t": T[None, :]}})
+    found = read_columns(tmp_path / "rig.mat", ["rec.pos[1]", "rec.t"])
+    np.testing.assert_array_equal(list(found.values()), [Y, T])
+    with pytest.raises(InputError, match=r"a matrix \(2 x 40\); name one of its rows, such as rec"):
+        read_columns(tmp_path / "rig.mat", ["rec.pos"])
+
+
+def test_mat_of_version_7_3(tmp_path):
+    h5py = pytest.importorskip("h5py", reason="h5py, of the extra mat73, is not installed")
+    with h5py.File(tmp_path / "rig.mat", "w", userblock_size=512) as file:
+        file["rec/pos"] = np.stack([R, Y]).T  # MATLAB writes its rows as columns
+        file["rec/t"] = T[:, None]
+    with (tmp_path / "rig.mat").open("r+b") as file:
+        file.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64")
+    found = read_columns(tmp_path / "rig.mat", ["rec.pos[1]", "rec.t"])
+    np.testing.assert_array_equal(list(found.values()), [Y, T])
+    with (tmp_path / "rig.mat").open("r+b") as file:
+        file.truncate(900)
+    with pytest.raises(InputError, match=r"is not a readable MATLAB 7\.3 file"):
+        read_columns(tmp_path / "rig.mat", ["rec.t"])
+
+
+BROKEN = [
+    ("a.csv", "", "the file holds nothing"),
+    ("a.csv", "r,y\n", "holds no numbers below the line of names"),
+    ("a.csv", "r,y\n1,2\n3,x\n", "line 3: 'x' in column y is not a number"),
+    ("a.csv", "1,x\n3,4\n5,6\n", "there is no r; the file holds 0, 1"),
+    ("a.csv", "r,y\n1,nan\n3,4\n", "y holds nan at sample 0"),
+    ("a.csv", "r,y\n1,\n3,4\n", "line 2 has 1 columns, not 2"),
+    ("a.csv", "r,y,y\n1,2,3\n3,4,5\n", "the column y is there 2 times; rename one, or name it by"),
+    ("a.csv", "r,y\n1\n2\n", "line 2 has 1 columns, not 2"),
+    ("a.csv", "a\0b", "is not a text file"),
+    ("a.csv.gz", "r,y\n1,2\n", "is not a whole gzip file"),
+    ("a.json", "", "is not JSON"),
+    ("a.json", '{"r": [1, 2', "is not JSON"),
+    ("a.json", '{"r": [], "y": []}', "there is no r; the file holds nothing"),
+    ("a.json", '[{"r": 1, "y": 2}, {"r": 1}]', "entry 1 has no y"),
+    ("a.json", '[{"r": 1, "y": 2}, {"r": 1, "y": null}]', "y is None in entry 1, not a number"),
+    ("a.json", '[{"r": 1, "y": 2}, {"r": 1, "y": "x"}]', "y is 'x' in entry 1, not a number"),
+    ("a.json", '[{"r": 1, "y": 2}, {"r": 1, "y": NaN}]', "y holds nan at sample 1"),
+    ("a.json", '[{"r": 1, "y": [2]}, {"r": 1, "y": [2, 3]}]', "y has rows of different lengths"),
+    ("a.json", "[" * 100_000, "(is not JSON|nested too deeply)"),
+    ("a.jsonl", '{"r": 1, "y": 2}\n{"r": 1,\n', "entry 2"),
+    ("a.mat", "x" * 100, "is not a readable MAT file"),
+    ("a.npz", "x" * 300, "is not a NPZ archive"),
+    ("a.parquet", "PAR1", "cannot tell the format"),
+    ("a.gz", "", "cannot tell the format"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "content", "says"), BROKEN)
+def test_broken_files_are_refused_in_a_sentence(tmp_path, name, content, says):
+    (tmp_path / name).write_bytes(content.encode())
+    with pytest.raises(InputError, match=says) as refused:
+        read_columns(tmp_path / name, ["r", "y"])
+    sentence = str(refused.value)
+    assert sentence.startswith(f"{tmp_path / name}: ") and "\n" not in sentence
+    assert sentence.endswith(".") and len(sentence) < 400
+
+
+def test_a_packed_file_that_stands_for_gigabytes_is_refused(tmp_path):
+    (tmp_path / "bomb.csv.gz").write_bytes(gzip.compress(b"1,2\n" * 2**24, 9))
+    (tmp_path / "bomb.json.gz").write_bytes(gzip.compress(b"[" + b"[]," * 2**23 + b"[]]", 9))
+    for name in ("bomb.csv.gz", "bomb.json.gz"):
+        with pytest.raises(InputError, match=r"bytes stand for .* bytes of numbers"):
+            read_columns(tmp_path / name, ["0"])
+
+
+def _whole(suffix: str, folder) -> bytes:
+    """Return the bytes of a good file."""
+    file = folder / f"whole{suffix}"
+    if suffix == ".mat":
+        savemat(file, {"r": R, "y": Y, "s": {"m": np.stack([R, Y])}}, do_compression=True)
+    elif suffix == ".npz":
+        np.savez_compressed(file, r=R, y=Y)
+    elif suffix in (".json", ".jsonl", ".ndjson"):
+        file.write_text(json.dumps([{"r": r, "y": y} for _, r, y in ROWS]))
+    else:
+        file.write_text("t,r,y\n" + table(","))
+    return file.read_bytes()
+
+
+@settings(max_examples=300)
+@given(suffix=st.sampled_from(sorted(READERS)), data=st.data())
+def test_whatever_the_bytes_there_are_numbers_or_a_sentence(tmp_path_factory, suffix, data):
+    folder = tmp_path_factory.getbasetemp()
+    content = bytearray(_whole(suffix, folder))
+    for _ in range(data.draw(st.integers(1, 6))):
+        at = data.draw(st.integers(0, len(content) - 1))
+        content[at : at + data.draw(st.integers(0, 3))] = data.draw(st.binary(max_size=4))
+    if data.draw(st.booleans()):
+        del content[data.draw(st.integers(0, len(content))) :]
+    file = folder / f"fuzzed{suffix}"
+    file.write_bytes(content)
+    for names in (["r", "y"], ["0"], ["s.m[1]"]):
+        try:
+            found = read_columns(file, names)
+        except InputError as refused:
+            assert "\n" not in str(refused) and str(refused).startswith(str(file))
+        else:
+            assert all(np.isfinite(each).all() and each.ndim == 1 for each in found.values())

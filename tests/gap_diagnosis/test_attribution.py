@@ -1,0 +1,89 @@
+"""When a gap counts as explained."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from gap_cases import SHORT, simulate_case, true_parameters
+
+from fjr_records.noise import noise_levels
+from fjr_sim_node.plant import PLANT
+from gap_diagnosis.model.simulated_rig import Model, Simulator
+from gap_diagnosis.notes import unexplained
+from gap_diagnosis.which.attribution import STANDS_OUT, Attribution, stands_out
+from gap_diagnosis.which.fits import Fit, Fitter
+from gap_diagnosis.which.least_squares import Solution
+from gap_diagnosis.which.search import Search
+from gap_diagnosis.which.search_space import Space
+
+
+@pytest.mark.parametrize(
+    ("left", "refit", "rival", "out"),
+    [
+        (10.0, 300.0, 280.0, True),  # another form of the catalogue's law
+        (9.0, 350.0, 19.0, True),  # next comes the same effect on the other side
+        (6.5, 55.0, 10.0, False),  # one of several substitutes
+        (70.0, 770.0, 200.0, False),
+        (2.1, 3.7, 2.9, False),
+    ],
+)
+def test_an_explanation_that_leaves_a_lot_must_stand_out(left, refit, rival, out):
+    assert (stands_out(left, refit, rival) > STANDS_OUT) is out
+
+
+class FewEffects(Fitter):
+    """A fitter whose catalogue holds a third mass and a gain of the torque."""
+
+    @property
+    def catalogue(self) -> list[str]:
+        return ["extra_mode", "torque_gain"]
+
+
+def test_a_gain_is_no_second_cause_beside_a_mode_on_a_rig_beyond_the_tolerance():
+    mode = {
+        "extra_mode.inertia_kg_m2": 0.1,
+        "extra_mode.frequency_hz": 22.0,
+        "extra_mode.damping_ratio": 0.02,
+    }
+    plant = {name: 1.25 * value for name, value in true_parameters(3, 0.02).items()}
+    recorded = simulate_case(mode, seed=3, plant=plant, **SHORT).recorded
+    noise = noise_levels(recorded).of_outputs(recorded)
+    nominal = Model.nominal(PLANT.defaults()).plant
+    fitter = FewEffects(recorded, Simulator(recorded), noise, nominal, (0, 2), (1, 3), 0.03)
+    found = Search(fitter).run()
+    assert found.best.effects == ("extra_mode",) and found.explained
+    assert not any({"extra_mode", "torque_gain"} == set(f.effects) for f in found.candidates)
+    assert found.best.held_chi2 / fitter.held.size < 2.0
+    assert found.best.model.effects["extra_mode.inertia_kg_m2"] == pytest.approx(0.1, rel=0.01)
+    for name, value in plant.items():
+        assert found.best.model.plant[name] == pytest.approx(value, rel=0.01)
+
+
+def fit(effects: tuple[str, ...], held_chi2: float, converged: bool = True) -> Fit:
+    solution = Solution(np.zeros(0), 0.0, np.zeros((1, 0)), np.zeros(1), converged)
+    return Fit(effects, Model({}, {}), Space({}), solution, 0.0, held_chi2)
+
+
+@pytest.mark.parametrize(
+    ("best", "candidates", "words"),
+    [
+        (("backlash",), [(("delay", "gravity"), 2000.0), (("backlash",), 3000.0)],
+         "misfit of 50.0 per degree of freedom, the best explanation, backlash, one of 30.0"),
+        ((), [(("delay",), 4000.0), (("backlash",), 4500.0)],
+         "misfit of 50.0 per degree of freedom, the best explanation, delay, one of 40.0"),
+        ((), [], "misfit of 50.0 per degree of freedom; none"),
+    ],
+)  # fmt: skip
+def test_the_note_on_what_is_left_pairs_each_name_with_its_own_misfit(best, candidates, words):
+    refit = fit((), 5000.0)
+    fits = tuple(fit(effects, chi2) for effects, chi2 in candidates)
+    chosen = next((f for f in fits if f.effects == best), refit)
+    found = Attribution(refit, fits, chosen, (), False)
+    assert words in unexplained(found, 100)
+
+
+def test_what_has_not_converged_is_not_called_the_best():
+    refit = fit((), 5000.0)
+    lost = fit(("delay",), 10.0, converged=False)
+    note = unexplained(Attribution(refit, (lost,), refit, (), False), 100)
+    assert "delay" not in note

@@ -1,0 +1,100 @@
+"""The confidence of a verdict: features, and the regression that blind cases calibrate."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from fjr_validation.blind.calibrate import calibrated, left_out, summary
+from gap_diagnosis.outcome.diagnosis import Candidate, Diagnosis, Gap, Gaps
+from gap_diagnosis.outcome.verdict_words import ON, meaning
+from gap_diagnosis.which.confidence import (
+    COEFFICIENTS,
+    NAMES,
+    UNTESTED,
+    confidence,
+    features,
+    group,
+)
+
+
+def gap(chi2):
+    return Gap(nrmse_position=0.1, nrmse_torque=0.1, chi2_per_dof=chi2)
+
+
+def candidate(effects, chi2):
+    return Candidate(effects=effects, held_out_chi2=chi2, delta=1.0, converged=True, parameters={})
+
+
+def said(verdict, left=1.0, second=50.0, effects=(), refit=100.0):
+    named = list(effects)
+    ranking = [candidate(named or ["cogging"], left), candidate(["delay"], second)]
+    return Diagnosis(
+        verdict=verdict, effects=named, equivalent=[[name] for name in named], confidence=0.0,
+        gap=Gaps(nominal=gap(200.0), refit=gap(refit), explained=gap(left), noise_floor=gap(1.0)),
+        ranking=ranking,
+    )  # fmt: skip
+
+
+VERDICTS = [
+    said("effect", effects=("backlash",)), said("ambiguous", effects=("backlash", "gravity")),
+    said("no_gap", refit=1.0), said("parameters_only", refit=1.0), said("unexplained", 30.0, 30.0),
+    said("nonstationary"), said("bad_data"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("diagnosis", VERDICTS, ids=lambda d: d.verdict)
+def test_every_verdict_has_a_confidence_between_half_and_one(diagnosis):
+    assert len(features(diagnosis)) == len(COEFFICIENTS[group(diagnosis)])
+    assert len(NAMES[group(diagnosis)]) == len(COEFFICIENTS[group(diagnosis)])
+    assert 0.5 < confidence(diagnosis) < 1.0
+
+
+@pytest.mark.parametrize("diagnosis", VERDICTS, ids=lambda d: d.verdict)
+def test_where_nothing_was_held_out_no_fit_is_more_likely_right_than_not(diagnosis):
+    untested = diagnosis.model_copy(update={"reported_on": "none"})
+    if group(diagnosis) == "gate":  # rests on no fit
+        assert confidence(untested) == confidence(diagnosis)
+    else:
+        assert confidence(untested) == UNTESTED <= 0.5
+    text = f"{meaning(untested)} {ON['none']}"
+    assert "not seen" not in text and "held-out" not in text
+
+
+def test_a_name_is_the_surer_the_further_the_next_one_lies_behind():
+    sure = [confidence(said("effect", 1.0, second, ("backlash",))) for second in (1.0, 3.0, 15.0)]
+    assert all(a < b for a, b in pairwise(sure))
+
+
+def test_what_contains_the_named_effect_or_is_in_its_set_is_no_rival():
+    equivalent = [["backlash", "piecewise_stiffness"]]
+    diagnosis = said("ambiguous", effects=("backlash",)).model_copy(
+        update={"equivalent": equivalent}
+    )
+    lead = features(diagnosis)[1]
+    diagnosis.ranking.append(candidate(["backlash", "gravity"], 0.9))
+    diagnosis.ranking.append(candidate(["piecewise_stiffness"], 1.0))
+    assert features(diagnosis)[1] == lead
+    diagnosis.ranking.append(candidate(["hysteresis"], 1.5))
+    assert features(diagnosis)[1] == pytest.approx(np.log(1.5))
+
+
+def test_the_regression_finds_the_shares_that_cases_were_drawn_with():
+    rng = np.random.default_rng(4)
+    cases = []
+    for second, right in ((2.0, 0.6), (20.0, 0.95)):
+        cases += [(said("effect", 1.0, second, ("backlash",)), rng.random() < right)
+                  for _ in range(400)]  # fmt: skip
+    beta = calibrated(cases)["named"]
+    for second, right in ((2.0, 0.6), (20.0, 0.95)):
+        values = features(said("effect", 1.0, second, ("backlash",)))
+        score = float(np.dot(beta, values))
+        assert 1.0 / (1.0 + np.exp(-score)) == pytest.approx(right, abs=0.06)
+
+
+def test_few_cases_without_a_miss_do_not_make_certain():
+    cases = [(said("effect", 1.0, 50.0, ("backlash",)), True)] * 8
+    assert 0.85 < left_out(cases)[0][0] < 0.999
+    assert any("8 of 8 right" in line for line in summary(cases))

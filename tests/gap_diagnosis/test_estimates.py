@@ -1,0 +1,191 @@
+"""Standard errors of fits whose law is right, and of fits whose law is not quite right."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from gap_cases import SHORT, fitter_of, simulate_case
+
+from fjr_validation.blind.calibrate import widening
+from fjr_validation.blind.cases import NOMINAL, Answer, Effect
+from fjr_validation.blind.outcome import Outcome
+from gap_diagnosis.model.simulated_rig import Model
+from gap_diagnosis.outcome.diagnosis import Diagnosis, Estimate, Gaps
+from gap_diagnosis.which.estimates import WIDENING, estimates, standard_errors, sure
+from gap_diagnosis.which.fits import Fit
+from gap_diagnosis.which.least_squares import Solution
+from gap_diagnosis.which.search_space import Space
+
+LINES, GROUPS = 600, 12
+AT = np.linspace(0.0, 1.0, LINES)
+GROUP = np.arange(LINES) * GROUPS // LINES
+JACOBIAN = 30.0 * np.stack([np.ones(LINES), AT], axis=1)
+RUNS = 400
+
+
+def coverage(law: np.ndarray, seed: int) -> np.ndarray:
+    """Return how often 1.96 standard errors hold the truth, zero, when the data hold a law too."""
+    rng = np.random.default_rng(seed)
+    inside = np.zeros(2)
+    for _ in range(RUNS):
+        data = rng.standard_normal(LINES) + law * rng.standard_normal()
+        x = np.linalg.lstsq(JACOBIAN, data, rcond=None)[0]
+        std = standard_errors(JACOBIAN, JACOBIAN @ x - data, GROUP)
+        inside += np.abs(x) < 1.96 * std
+    return inside / RUNS
+
+
+def test_intervals_of_a_right_law_hold_the_truth_as_often_as_they_say():
+    assert (coverage(np.zeros(LINES), 1) >= 0.93).all()
+    assert (coverage(np.zeros(LINES), 1) <= 0.995).all()
+
+
+def test_intervals_widen_where_neighbouring_lines_err_alike():
+    law = 2.0 * np.sin(2.0 * np.pi * 1.3 * AT + 0.4)
+    assert (coverage(law, 2) >= 0.85).all()
+    rng = np.random.default_rng(3)
+    noise = rng.standard_normal(LINES)
+    left = noise - JACOBIAN @ np.linalg.lstsq(JACOBIAN, noise, rcond=None)[0]
+    alike = left + law - JACOBIAN @ np.linalg.lstsq(JACOBIAN, law, rcond=None)[0]
+    shuffled = rng.permutation(alike)
+    together = standard_errors(JACOBIAN, alike, GROUP)
+    assert (together > 1.5 * standard_errors(JACOBIAN, shuffled, GROUP)).all()
+
+
+def test_a_parameter_that_one_group_alone_tells_is_not_called_certain():
+    jacobian = np.stack([np.ones(LINES), (GROUP == 3).astype(float)], axis=1)
+    residuals = np.random.default_rng(4).standard_normal(LINES)
+    residuals -= jacobian @ np.linalg.lstsq(jacobian, residuals, rcond=None)[0]
+    std = standard_errors(jacobian, residuals, GROUP)
+    assert np.isfinite(std).all()
+    assert std[1] >= 0.9 * np.sqrt(1.0 / np.count_nonzero(GROUP == 3)) == pytest.approx(0.127, 0.01)
+
+
+def fitted(names: tuple[str, ...], values: tuple[float, ...], stds: tuple[float, ...]) -> Fit:
+    """Return a fit of effects whose parameters have these values and standard errors."""
+    rng = np.random.default_rng(6)
+    columns = np.linalg.qr(rng.standard_normal((LINES, len(names))))[0] / np.array(stds)
+    residuals = 0.5 * rng.standard_normal(LINES)
+    effects = tuple(dict.fromkeys(name.split(".")[0] for name in names))
+    model = Model({}, dict(zip(names, values, strict=True)))
+    solution = Solution(np.array(values), 0.0, columns, residuals, True)
+    return Fit(effects, model, Space({}, names, (1.0,) * len(names)), solution, 0.0, 0.0)
+
+
+BIAS, ECCENTRIC = "torque_bias.torque_nm", "encoder_eccentricity.amplitude_rad"
+PHASE = "encoder_eccentricity.phase_rad"
+PRESLIDING = ("presliding_friction.motor_rad", "presliding_friction.link_rad")
+
+
+@pytest.mark.parametrize(
+    ("names", "values", "stds", "there"),
+    [
+        ((BIAS,), (-1.0,), (0.1,), True),
+        ((BIAS,), (-1.0,), (2.0,), False),
+        ((ECCENTRIC, PHASE), (0.1, 0.0), (0.01, 0.1), True),  # a phase may be zero
+        ((ECCENTRIC, PHASE), (0.1, 1.0), (0.2, 0.1), False),
+        (PRESLIDING, (1e-2, 0.0), (1e-3, 1e-3), True),  # one side is enough
+        (PRESLIDING, (1e-2, 1e-2), (1e-1, 1e-1), False),
+        ((BIAS, ECCENTRIC, PHASE), (1.0, 0.1, 1.0), (0.1, 0.2, 0.1), False),
+    ],
+)
+def test_an_effect_whose_size_may_be_zero_is_not_sure(names, values, stds, there):
+    assert sure(fitted(names, values, stds), GROUP) is there
+
+
+def test_a_gain_is_known_as_far_as_the_datasheet_is():
+    names, rng = ("torque_gain.relative_error",), np.random.default_rng(7)
+    base = np.linalg.qr(rng.standard_normal((LINES, 3)))[0] * 1e3
+    jacobian = np.column_stack([base, -base.sum(axis=1)])  # a gain scales all of them
+    residuals = rng.standard_normal(LINES)
+    nominal = {"jm": 0.2, "fsm": 6.0, "fvm": 2.0}
+    for gain, there in ((0.3, True), (0.02, False)):
+        x = np.array([0.0, 0.0, 0.0, gain])
+        model = Model(nominal, {names[0]: gain})
+        space = Space(nominal, names, (1.0,), 0.1)
+        solution = Solution(x, 1.0, jacobian, residuals, True)
+        fit = Fit(("torque_gain",), model, space, solution, 1.0, 1.0)
+        found = estimates(fit, GROUP)[names[0]]
+        assert 0.05 < found.high - found.low < 0.2
+        assert sure(fit, GROUP) is there
+
+
+def said(count: int, *offs: float) -> Outcome:
+    """Return a right verdict of so many effects, its first parameters off by so much.
+
+    The interval is 1 to both sides before it is widened.
+    """
+    names = ("delay", "backlash")[:count]
+    true = [Effect(name, 1.0, 1.0, 1.0, {}) for name in names]
+    parameters = {
+        name: Estimate(value=NOMINAL[name] - off, low=NOMINAL[name] - off - WIDENING[count],
+                       high=NOMINAL[name] - off + WIDENING[count])
+        for name, off in zip(NOMINAL, offs, strict=False)
+    }  # fmt: skip
+    kind = ("parameters", "single", "two")[count]
+    diagnosis = Diagnosis(
+        verdict="effect" if count else "parameters_only", effects=list(names), confidence=0.9,
+        equivalent=[[name] for name in names], parameters=parameters,
+        gap=Gaps(nominal=None, refit=None, explained=None, noise_floor=None),
+    )  # fmt: skip
+    return Outcome("case_000", "fjr", Answer(kind, true, NOMINAL, 0.0), diagnosis, "", 1.0)
+
+
+def test_blind_cases_tell_by_how_much_intervals_must_be_widened():
+    rng = np.random.default_rng(5)
+    sizes = (0.3, 0.8, 2.0)
+    cases = [said(n, *size * rng.standard_normal(8)) for n, size in enumerate(sizes)
+             for _ in range(100)]  # fmt: skip
+    none, one, two = widening(cases)
+    assert none == 1.0  # never narrower than the theory says
+    assert one == pytest.approx(0.8 * 1.96, rel=0.1) and two == pytest.approx(2.0 * 1.96, rel=0.1)
+    assert widening([]) == pytest.approx(WIDENING)
+
+
+def test_intervals_tell_of_a_valley_along_which_parameters_replace_each_other():
+    """Seen from zero, an eccentric encoder errs in gain, which scales all but Coulomb friction."""
+    truth = {"encoder_eccentricity.amplitude_rad": 0.15, "encoder_eccentricity.phase_rad": -1.25}
+    case = simulate_case(truth, seed=3, noise_rad=5e-4, **SHORT)
+    fitter = fitter_of(case)[2]
+    refit = fitter.refit()
+    screening = fitter.screening(refit, "encoder_eccentricity")
+    fit = fitter.add(refit, "encoder_eccentricity", screening.proposals())
+    assert fit.converged and fit.held_chi2 / fitter.held.size < 1.2
+    found = estimates(fit, fitter.train.groups())
+    for name, value in case.truth.plant.items():
+        std = (found[name].high - found[name].low) / 3.92
+        assert abs(found[name].value - value) < 4.0 * std, name
+    assert found["jm"].high - found["jm"].low > 0.02 * found["jm"].value
+
+
+def test_the_jacobian_that_intervals_rest_on_is_exact_where_the_loop_bends_soon():
+    fitter = fitter_of(simulate_case(seed=0, **SHORT))[2]
+    fit = fitter.refit()
+    x, half = fit.solution.x, 1e-6
+    points = [x + sign * half * row for row in np.eye(x.size) for sign in (1.0, -1.0)]
+    errors = fitter.train.errors([fit.space.model(point) for point in points])
+    central = ((errors[0::2] - errors[1::2]) / (2.0 * half)).T
+    off = np.linalg.norm(fit.solution.jacobian - central, axis=0)
+    assert (off < 1e-3 * np.linalg.norm(central, axis=0)).all()
+
+
+def test_a_size_that_its_shape_hides_is_kept_from_zero_by_the_fit_without_it():
+    """With two parameters that replace each other, the linear interval of the size holds zero."""
+    x = np.array([1.0, 0.5])
+    jacobian = np.array([[1.0, 1.0], [0.0, 1e-3], [0.0, 0.0]])
+    solution = Solution(x, 3.0, jacobian, np.array([1.0, 1.0, 1.0]), True)
+    names = ("backlash.half_gap_rad", "piecewise_stiffness.soft_ratio")
+    space = Space({}, names, (1e-3, 1.0))
+    model = Model({}, dict(zip(names, (1e-3, 0.5), strict=True)))
+    fit = Fit(("backlash",), model, space, solution, 3.0, 3.0)
+    groups = np.array([0, 1, 2])
+    hidden = estimates(fit, groups)["backlash.half_gap_rad"]
+    assert hidden.low == 0.0 and not sure(fit, groups)
+    weak = replace(fit, without={"backlash": 6.0})
+    assert estimates(weak, groups)["backlash.half_gap_rad"] == hidden and not sure(weak, groups)
+    strong = replace(fit, without={"backlash": 3.0 + 4.0 * 1.96**2})
+    seen = estimates(strong, groups)["backlash.half_gap_rad"]
+    assert seen.low == pytest.approx(0.5e-3) and seen.high == hidden.high
+    assert sure(strong, groups)

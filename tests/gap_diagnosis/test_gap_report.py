@@ -1,0 +1,235 @@
+"""What a diagnosis writes: report, diagnosis.json, updated.yaml; whole or not at all."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import re
+
+import numpy as np
+import pytest
+from gap_cases import simulate_case
+from html_page import EVIL, Page
+from plotly.offline import get_plotlyjs
+
+from fjr_bringup.campaign.plan import Campaign
+from fjr_interface.parameter_file import load_parameter_file
+from fjr_kit.errors import InputError
+from fjr_kit.plots import BARRED
+from fjr_records.noise import noise_levels
+from fjr_sim_node.plant import PLANT
+from gap_diagnosis.gates.gate_checks import check_gates
+from gap_diagnosis.how_far.comparison import bla_distance_db, compare
+from gap_diagnosis.how_far.held_out_gap import held_out_gap
+from gap_diagnosis.investigation import Investigation, investigate
+from gap_diagnosis.model.misfit import Misfit
+from gap_diagnosis.model.simulated_rig import Model, Simulator
+from gap_diagnosis.outcome.diagnosis import Diagnosis, Estimate, NextExperiment
+from gap_diagnosis.outcome.verdict_words import WORDS
+from gap_diagnosis.report.gap_output import updated_values, write_diagnosis
+from gap_diagnosis.report.gap_report import render_gap_report
+from gap_diagnosis.where.residual_map import residual_map
+from gap_diagnosis.which.attribution import Attribution
+from gap_diagnosis.which.fits import Fit
+from gap_diagnosis.which.least_squares import Solution
+from gap_diagnosis.which.search_space import Space
+
+GAP = {"backlash.half_gap_rad": 1.5e-3}
+SHORT = {"base_frequency_hz": 0.5, "transient_periods": 2, "levels_rad": (3e-3, 1e-2)}
+
+
+def fit_of(model: Model, misfit: Misfit, converged: bool = True) -> Fit:
+    """Return a model as if it had been fitted."""
+    effects = tuple(sorted({name.split(".")[0] for name in model.effects}))
+    space = Space(model.plant, tuple(model.effects), (1e-3,) * len(model.effects))
+    errors = misfit.errors([model])[0]
+    cost = float(errors @ errors)
+    solution = Solution(np.zeros(8), cost, np.eye(errors.size, 8), errors, converged)
+    return Fit(effects, model, space, solution, cost, cost)
+
+
+@pytest.fixture(scope="module")
+def found() -> Investigation:
+    """Return an investigation whose fits are the true parameters, with and without backlash."""
+    case = simulate_case(GAP, seed=12, **SHORT)
+    recorded, noise = case.recorded, noise_levels(case.recorded)
+    nominal = Model.nominal(PLANT.defaults())
+    simulator, held = Simulator(recorded), (1, 3)
+    std = np.array([noise.position[noise.row(r.level)] for r in recorded.realizations])
+    misfit = Misfit(recorded, simulator, std, held)
+    refit, best = fit_of(case.bare, misfit), fit_of(case.truth, misfit)
+    lost = fit_of(case.bare.with_effects({"delay.time_s": 1e-4}), misfit, converged=False)
+    models = {"nominal": nominal, "refit": case.bare, "explained": case.truth}
+    signals = {k: simulator.signals(m) for k, m in models.items()}
+    maps = {k: residual_map(recorded, noise, *simulated) for k, simulated in signals.items()}
+    parameters = {**case.truth.plant, **GAP}
+    misfits = {"nominal": 345.6, "refit": 100.0, "explained": 1.02}
+    gaps, figures = held_out_gap(recorded, held, signals, misfits, closes=True)
+    diagnosis = Diagnosis(
+        verdict="ambiguous",
+        effects=["backlash"],
+        equivalent=[["backlash", "piecewise_stiffness"]],
+        confidence=0.9,
+        gap=gaps,
+        gap_closed=0.98,
+        gap_figures=figures,
+        where=maps["refit"].places(),
+        ranking=[],
+        parameters={k: Estimate(value=v, low=0.9 * v, high=1.1 * v) for k, v in parameters.items()},
+        next_experiment=NextExperiment(
+            kind="amplitude",
+            description="Play 0.5 mrad.",
+            separates=["backlash", "piecewise_stiffness"],
+            predicted_sigma=12.0,
+            rig_time_s=36.0,
+            settings={"amplitude_rad": 5e-4},
+        ),
+        notes=["A note that must be seen."],
+    )
+    attribution = Attribution(refit, (best, lost), best, (), True)
+    gates = check_gates(recorded, nominal, noise)
+    return Investigation(
+        recorded, nominal, gates, noise, held, signals, maps, attribution, diagnosis
+    )
+
+
+@pytest.fixture(scope="module")
+def page(found) -> Page:
+    return Page(render_gap_report(found, {"command": "fjr diagnose x"}))
+
+
+def test_every_plot_has_its_place_and_every_place_a_plot(page):
+    places = {attrs["id"] for _, attrs in page.tags if attrs.get("class") == "plot"}
+    plots = page.data()
+    assert places == set(plots["overview"]) | set(plots["levels"][0])
+    assert len(plots["levels"]) == 2
+
+
+def test_verdict_doubt_notes_sets_and_next_experiment_are_said(page, found):
+    text = " ".join(" ".join(page.texts).split())
+    assert "backlash or piecewise stiffness" in text and "confidence 90%" in text
+    assert WORDS["ambiguous"].doubt in text and "A note that must be seen." in text
+    assert "Play 0.5 mrad." in text and "36 s of rig time" in text
+    assert "fjr diagnose x" in text and "not converged" in text
+    assert all(gate.sentence in text for gate in found.gates.gates)
+
+
+def test_the_held_out_gap_is_told_once_with_misfit_and_intervals(page, found):
+    text = " ".join(" ".join(page.texts).split())
+    refit = found.diagnosis.gap_figures.position.refit
+    told = f"{100.0 * refit.value:.3g} [{100.0 * refit.low:.3g}, {100.0 * refit.high:.3g}]"
+    assert text.count(told) == 1
+    assert "misfit per degree of freedom 345.6 100 1.02 1" in text
+
+
+def test_the_page_asks_nothing_of_any_network(found):
+    own = render_gap_report(found, {}).replace(get_plotlyjs(), "")
+    assert not re.search(r"https?:|//[\w.]+\.\w+/|@import|url\(", own)
+
+
+def test_texts_from_bags_cannot_become_code(found):
+    bags = tuple(dataclasses.replace(r, name=EVIL) for r in found.recorded.realizations)
+    recorded = dataclasses.replace(found.recorded, source=EVIL, realizations=bags)
+    proposed = found.diagnosis.next_experiment.model_copy(
+        update={"description": EVIL, "separates": [EVIL], "settings": {EVIL: EVIL}}
+    )
+    diagnosis = found.diagnosis.model_copy(update={"notes": [EVIL], "next_experiment": proposed})
+    hostile = dataclasses.replace(found, recorded=recorded, diagnosis=diagnosis)
+    made = Page(render_gap_report(hostile, {"command": EVIL}))
+    assert len(made.scripts) == 3 and not any(tag == "img" for tag, _ in made.tags)
+    assert made.texts.count(EVIL) == 4  # folder, command, note, proposal
+
+
+def test_the_maps_hold_sigma_of_every_line(page, found):
+    traces = page.data()["overview"]["where-position"]["data"]
+    assert len(traces) == 3
+    lines = 2 * (found.recorded.lines - 1)
+    assert all(len(t["x"]) == lines for t in traces)
+    colors = [np.mean(t["marker"]["color"]) for t in traces]
+    assert colors[0] > colors[2] + 0.5 and colors[1] > colors[2] + 0.5
+    sigma = found.maps["refit"].signals["position"].sigma[:, 1:]
+    expected = np.clip(np.log10(np.maximum(sigma, 1e-3)), 0.0, 4.0)
+    assert np.isclose(np.mean(traces[1]["marker"]["color"]), expected.mean(), rtol=1e-4)
+
+
+def test_the_tools_of_a_map_lie_above_its_colour_bar(page):
+    for name in ("where-position", "where-torque"):
+        plot = page.data()["overview"][name]
+        assert plot["data"][-1]["marker"]["showscale"]
+        assert plot["layout"].items() >= BARRED.items()
+
+
+def test_the_true_model_has_the_rigs_bla_and_distortion_and_the_bare_one_has_not(found):
+    for level in compare(found.recorded, found.signals, found.held):
+        far = {name: bla_distance_db(level.rig, one) for name, one in level.models.items()}
+        assert far["explained"] < 0.05 and far["refit"] > 10 * far["explained"]
+        rig, model = level.rig.odd.corrected, level.models["explained"].odd.corrected
+        assert np.median(np.abs(20 * np.log10(model / rig))) < 0.5
+        error = level.position["explained"] - level.position["rig"]
+        assert np.std(error) < 3e-5  # the encoder noise is 2e-5 in each of two periods
+
+
+def test_the_folder_holds_all_that_was_promised_and_earlier_files_go(found, tmp_path):
+    out = tmp_path / "out"
+    (out / "figures").mkdir(parents=True)
+    for name in ("figures/old.png", "updated.yaml", "mine.txt"):
+        (out / name).write_text("old")
+    report = write_diagnosis(found, out, command="fjr diagnose x", date="2026-01-02")
+    assert report == out / "report.html" and report.read_text().startswith("<!DOCTYPE html>")
+    assert Diagnosis.read(out / "diagnosis.json") == found.diagnosis
+    assert not (out / "figures" / "old.png").exists() and (out / "mine.txt").read_text() == "old"
+    stems = {path.stem for path in (out / "figures").iterdir()}
+    assert stems == {"where_position", "where_torque", "sigma_refit", "residual_torque"}
+    for stem in stems:
+        assert (out / "figures" / f"{stem}.pdf").stat().st_size > 1000
+    assert not list(tmp_path.glob(".*")) and not list(out.glob(".*"))
+
+
+def test_diagnosis_json_has_the_fields_of_its_schema_and_no_other(found):
+    text = json.loads(found.diagnosis.to_json())
+    assert list(text) == [
+        "schema", "verdict", "effects", "equivalent", "confidence", "reported_on", "gap",
+        "gap_closed", "gap_figures", "bags", "where",
+        "ranking", "parameters", "next_experiment", "notes",
+    ]  # fmt: skip
+    assert text["schema"] == "fjr_rig/diagnosis/1"
+    assert set(text["gap"]) == {"nominal", "refit", "explained", "noise_floor"}
+    assert set(text["where"][0]) == {"level", "band_hz", "lines", "signal", "sigma"}
+
+
+def test_a_folder_that_cannot_be_written_is_one_sentence(found, tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="is a file; name a folder"):
+        write_diagnosis(found, tmp_path / "file")
+
+
+def test_the_updated_file_is_a_campaign_of_the_better_simulation(found, tmp_path):
+    out = tmp_path / "out"
+    write_diagnosis(found, out)
+    campaign = Campaign.create(out / "updated.yaml")
+    values = updated_values(found)
+    simulator = campaign.values["simulator"]
+    for name, estimate in found.diagnosis.parameters.items():
+        assert simulator[name] == estimate.value
+    assert simulator["noise_std_rad"] == 0.0
+    assert campaign.values["controller"] == values["controller"]
+    made, recorded = campaign.experiment(1, 0), found.recorded.experiment
+    assert made.samples_per_period == recorded.samples_per_period
+    assert made.amplitude_rad == pytest.approx(1e-2)
+    assert len(made.excited_harmonics) == len(recorded.excited_harmonics)
+    assert load_parameter_file(out / "updated.yaml").keys() == values.keys()
+
+
+def test_bad_data_is_reported_with_the_rig_alone(tmp_path):
+    recorded = simulate_case(seed=1, **SHORT).recorded
+    bags = list(recorded.realizations)
+    bags[0] = dataclasses.replace(bags[0], torque=1.2 * bags[0].torque)
+    broken = dataclasses.replace(recorded, realizations=tuple(bags))
+    found = investigate(broken, PLANT.defaults())
+    assert found.diagnosis.verdict == "bad_data"
+    assert any("1.2 times that of the law" in note for note in found.diagnosis.notes)
+    report = write_diagnosis(found, tmp_path / "out")
+    page = Page(report.read_text())
+    assert page.data()["overview"] == {} and "bla" in page.data()["levels"][0]
+    assert not (tmp_path / "out" / "updated.yaml").exists()
+    assert Diagnosis.read(tmp_path / "out" / "diagnosis.json").verdict == "bad_data"

@@ -1,0 +1,252 @@
+"""Rigs that are not the paper's: other controllers or none known, rigid axis, second encoder."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from effect_rig import relative_rms
+from gap_cases import simulate_case, write_bags
+
+from fjr_interface.bags.reader import SignalMap
+from fjr_records.recorded import read_experiment
+from fjr_sim_node import effects
+from fjr_sim_node.plant import PLANT
+from fjr_sim_node.theory import linear
+from gap_diagnosis.gates.bags_gate import bags_gate
+from gap_diagnosis.gates.gate_checks import check_gates
+from gap_diagnosis.model.misfit import Misfit
+from gap_diagnosis.model.prediction import crossover_hz, lead, observer
+from gap_diagnosis.model.simulated_rig import Model, Simulator
+from gap_diagnosis.which.fits import Fitter
+from gap_diagnosis.which.least_squares import solve
+from gap_diagnosis.which.search import Search
+from gap_diagnosis.which.search_space import Space
+
+NOMINAL = PLANT.defaults()
+LEAD_WITH_INTEGRATOR = {
+    "kind": "transfer_function",
+    "numerator": [1650.0, -3270.0, 1620.5],
+    "denominator": [1.0, -1.96, 0.96],
+    "torque_limit_nm": None,
+}
+RIGID = {"k0": math.inf, "k1": 0.0}
+SMALL = {"levels_rad": (3e-3, 1e-2)}
+
+
+def search(recorded, nominal, *names):
+    """Search over a few effects, else as a diagnosis does."""
+
+    class Few(Fitter):
+        catalogue = names or Fitter.catalogue
+
+    model, simulator = Model.nominal(nominal), Simulator(recorded)
+    noise = simulator.noise(model).of_outputs(recorded)
+    numbers = range(len(recorded.realizations))
+    fitter = Few(recorded, simulator, noise, model.plant, numbers[0::2], numbers[1::2])
+    return Search(fitter).run(), fitter
+
+
+def changed(recorded, **by_name):
+    """Return the record with attributes of all realizations changed by functions of them."""
+    bags = (
+        replace(r, **{name: change(r) for name, change in by_name.items()})
+        for r in recorded.realizations
+    )
+    return replace(recorded, realizations=tuple(bags))
+
+
+def unknown_controller(recorded):
+    return changed(
+        recorded, experiment=lambda r: r.experiment.model_copy(update={"controller": None})
+    )
+
+
+def without_reference(recorded):
+    return changed(recorded, reference=lambda _: None)
+
+
+@pytest.fixture(scope="module")
+def backlash():
+    return simulate_case({"backlash.half_gap_rad": 1.5e-3}, seed=5, **SMALL)
+
+
+@pytest.mark.parametrize("losing", [unknown_controller, without_reference])
+def test_the_effect_is_found_without_controller_or_reference(backlash, losing):
+    recorded = losing(backlash.recorded)
+    found, fitter = search(recorded, NOMINAL, "backlash", "delay", "transmission_damping")
+    assert found.best.effects == ("backlash",) and found.explained and not found.tied
+    assert found.best.model.effects["backlash.half_gap_rad"] == pytest.approx(1.5e-3, rel=0.02)
+    assert found.best.held_chi2 / fitter.held.size < 1.5
+    for name, value in backlash.truth.plant.items():
+        assert found.best.model.plant[name] == pytest.approx(value, rel=0.05)
+
+
+def test_prediction_errors_of_the_true_rig_are_noise_and_their_noise_is_known(backlash):
+    recorded = unknown_controller(backlash.recorded)
+    simulator = Simulator(recorded)
+    noise = simulator.noise(backlash.bare).of_outputs(recorded)  # of a model that is not true
+    misfit = Misfit(recorded, simulator, noise, range(4), model_error=0.0)
+    assert 0.8 < misfit.chi2(backlash.truth) < 1.3
+    assert misfit.chi2(backlash.bare) > 100.0
+
+
+def test_the_gates_say_what_a_prediction_loses(backlash):
+    for losing, word in ((unknown_controller, "controller"), (without_reference, "reference")):
+        recorded = losing(backlash.recorded)
+        report = check_gates(recorded, backlash.bare)
+        assert not report.failures
+        assert "controller identity" not in [gate.name for gate in report.gates]
+        (note,) = [note for note in report.notes if "observer" in note]
+        assert note.startswith(f"The {word} is not known") and "Lost are" in note
+
+
+def test_the_observer_is_a_lead_that_crosses_over_where_it_says():
+    frequency, gain, rate = 4.0, 120.0, 1000.0
+    law = lead(gain, frequency, rate)
+    z = np.exp(2j * np.pi * np.array([frequency]) / rate)
+    value = np.polyval(law.numerator, z) / np.polyval(law.denominator, z)
+    assert np.abs(value[0]) == pytest.approx(gain, rel=1e-9)
+    assert np.degrees(np.angle(value[0])) == pytest.approx(54.9, abs=0.1)
+
+
+def test_the_observer_takes_its_gain_from_the_record(backlash):
+    recorded = unknown_controller(backlash.recorded)
+    assert crossover_hz(recorded) == pytest.approx(4.975)
+    law = observer(recorded)
+    z = np.exp(2j * np.pi * crossover_hz(recorded) / 1000.0)
+    gain = np.abs(np.polyval(law.numerator, z) / np.polyval(law.denominator, z))
+    inertia = NOMINAL["jm"] + NOMINAL["j"]
+    of_inertia = inertia * (2 * np.pi * crossover_hz(recorded)) ** 2
+    assert of_inertia < gain < 3.0 * of_inertia  # friction adds to it
+
+
+def test_bags_without_reference_or_description_are_read(tmp_path, backlash):
+    small = replace(backlash.recorded, realizations=backlash.recorded.realizations[2:])
+    folder = write_bags(replace(backlash, recorded=small), tmp_path / "bags")
+    whole = read_experiment(folder)
+    assert whole.repeatable
+    bare = read_experiment(folder, SignalMap.parse(["reference=none"]))
+    assert not bare.repeatable
+    for a, b in zip(whole.realizations, bare.realizations, strict=True):
+        assert b.reference is None and np.array_equal(a.torque, b.torque)
+
+
+def test_a_rig_with_another_controller_is_diagnosed():
+    case = simulate_case(
+        {"transmission_damping.nm_s_rad": 0.5}, seed=4, controller=LEAD_WITH_INTEGRATOR, **SMALL
+    )
+    report = check_gates(case.recorded, Model.nominal(NOMINAL))
+    assert "controller identity" in [gate.name for gate in report.gates if gate.passed]
+    found, fitter = search(case.recorded, NOMINAL, "transmission_damping", "backlash", "delay")
+    assert found.best.effects == ("transmission_damping",)
+    assert found.best.held_chi2 / fitter.held.size < 1.5
+
+
+def test_a_rigid_axis_is_one_body():
+    values = {**NOMINAL, **RIGID}
+    rigid = Model.nominal(values)
+    assert rigid.rigid and set(rigid.plant) == {"jm", "fsm", "fvm"}
+    assert rigid.plant["jm"] == values["jm"] + values["j"]
+    stiff = Model.nominal({**NOMINAL, "k0": 1e7, "k1": 0.0})
+    reference = simulate_case(seed=1, levels_rad=(1e-2,), realizations=1).recorded
+    (near, far), (torque, other) = zip(
+        *(Simulator(reference).signals(model) for model in (rigid, stiff)), strict=True
+    )
+    assert relative_rms(near, far) < 1e-3 and relative_rms(torque, other) < 1e-2
+    frequency = np.linspace(0.5, 50.0, 100)
+    assert np.allclose(
+        linear.g0(values, frequency, 1000.0),
+        linear.g0({**NOMINAL, "k0": 1e8}, frequency, 1000.0),
+        rtol=1e-3,
+    )
+
+
+@pytest.mark.parametrize(
+    "effect",
+    [
+        {"stribeck_friction_motor.torque_nm": 2.0, "stribeck_friction_motor.velocity_rad_s": 0.05},
+        {"presliding_friction.motor_rad": 1e-3},
+        {"quadratic_friction.motor_nm_s2_rad2": 1.0},
+        {"delay.time_s": 5e-4},
+    ],
+    ids=lambda effect: next(iter(effect)),
+)
+def test_motor_side_effects_of_a_rigid_axis_are_found(effect):
+    case = simulate_case(effect, seed=7, plant=RIGID, **SMALL)
+    name = next(iter(effect)).split(".")[0]
+    found, fitter = search(case.recorded, {**NOMINAL, **RIGID}, name, "torque_bias", "cogging")
+    assert found.best.effects == (name,)
+    assert found.best.held_chi2 / fitter.held.size < 1.5
+    for parameter, value in effect.items():
+        assert found.best.model.effects[parameter] == pytest.approx(value, rel=0.05)
+    assert not any(".link_" in parameter for parameter in found.best.space.effects)
+
+
+def test_effects_of_transmission_and_link_are_not_looked_for_on_a_rigid_axis():
+    case = simulate_case(seed=7, plant=RIGID, **SMALL)
+    model, simulator = Model.nominal({**NOMINAL, **RIGID}), Simulator(case.recorded)
+    levels = simulator.noise(model)
+    std = levels.of_outputs(case.recorded)
+    fitter = Fitter(case.recorded, simulator, std, model.plant, (0, 2), (1, 3))
+    fitted = {effect.identifier for effect in effects.CATALOGUE if effect.starts}
+    assert fitted - set(fitter.catalogue) == {
+        "stribeck_friction_link", "load_friction", "backlash", "piecewise_stiffness", "hysteresis",
+        "transmission_damping", "kinematic_error", "extra_mode", "gravity",
+    }  # fmt: skip
+    refit = fitter.refit()
+    assert set(refit.model.plant) == {"jm", "fsm", "fvm"}
+    assert refit.held_chi2 / fitter.held.size < 1.3
+    assert bags_gate(case.recorded, levels, simulator, refit.model).passed
+
+
+def with_link_noise(recorded, std_rad=2e-5):
+    rng = np.random.default_rng(9)
+    return changed(recorded, link=lambda r: r.link + std_rad * rng.standard_normal(r.link.shape))
+
+
+def test_a_second_encoder_tells_the_motors_presliding_from_the_links():
+    """The same fits with and without q: how far the wrong side stays from the right one."""
+    case = simulate_case({"presliding_friction.link_rad": 5e-4}, seed=6, with_link=True, **SMALL)
+    both = with_link_noise(case.recorded)
+    gaps = []
+    for recorded in (changed(both, link=lambda _: None), both):
+        simulator = Simulator(recorded)
+        noise = simulator.noise(case.bare).of_outputs(recorded)
+        fitter = Fitter(recorded, simulator, noise, NOMINAL, (0, 2), (1, 3))
+        start = fitter.refit()
+        right, wrong = (
+            solved(fitter, start, f"presliding_friction.{side}_rad", 4e-4)
+            for side in ("link", "motor")
+        )
+        assert right / fitter.train.size < 1.5
+        gaps.append(wrong - right)
+    assert gaps[1] > 1.5 * gaps[0] > 0.0
+
+
+def solved(fitter, start, name, value):
+    """Return the training chi-square with one effect parameter free, from a value."""
+    space = Space(NOMINAL, (name,), (value,))
+    low, high = space.bounds()
+    point = np.append(start.solution.x, 1.0)
+    found = solve(
+        lambda points: fitter.train.errors([space.model(p) for p in points]), point, low, high
+    )
+    return found.cost
+
+
+def test_the_second_encoder_counts_without_its_zero():
+    case = simulate_case(seed=6, with_link=True, levels_rad=(7e-3,))
+    recorded = with_link_noise(case.recorded)
+    simulator = Simulator(recorded)
+    noise = simulator.noise(case.truth).of_outputs(recorded)
+    assert noise.shape == (2, 2, recorded.lines)
+    misfit = Misfit(recorded, simulator, noise, range(2), model_error=0.0)
+    assert misfit.size == 2 * (2 * (2 * recorded.lines - 1) - 1)
+    assert misfit.chi2(case.truth) == pytest.approx(1.0, abs=0.2)
+    turned = changed(recorded, link=lambda r: r.link + 1.234)
+    same = Misfit(turned, simulator, noise, range(2), model_error=0.0)
+    assert same.chi2(case.truth) == pytest.approx(misfit.chi2(case.truth), rel=1e-6)
+    scaled = changed(recorded, link=lambda r: 1.01 * r.link)
+    wrong = Misfit(scaled, simulator, noise, range(2), model_error=0.0)
+    assert wrong.chi2(case.truth) > 2.0

@@ -1,0 +1,97 @@
+"""A coarse encoder is seen in the record, and named where the refit leaves nothing but it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from gap_cases import simulate_case
+
+from bla_analyzer.checks import TRANSIENT_LIMIT
+from fjr_records.encoder_step import position_step
+from fjr_records.noise import noise_levels
+from fjr_records.realization import unsettled
+from fjr_sim_node.plant import PLANT
+from gap_diagnosis.model.misfit import Misfit
+from gap_diagnosis.model.simulated_rig import Model, Simulator
+from gap_diagnosis.outcome.verdict_words import ROUNDING
+from gap_diagnosis.which.attribution import Attribution
+from gap_diagnosis.which.fits import Fitter
+from gap_diagnosis.which.rounding import widened, with_rounding
+
+STEP = 6e-4
+SHORT = {"base_frequency_hz": 0.5, "levels_rad": (4e-3, 1.2e-2), "transient_periods": 2}
+
+
+@pytest.fixture(scope="module")
+def coarse():
+    return simulate_case({f"{ROUNDING}.resolution_rad": STEP}, seed=5, **SHORT)
+
+
+def test_the_step_is_read_from_the_record(coarse):
+    assert position_step(coarse.recorded) == pytest.approx(STEP, rel=1e-9)
+
+
+def test_the_step_is_read_where_the_lowest_level_has_a_few_counts_only():
+    case = simulate_case({f"{ROUNDING}.resolution_rad": 5e-3}, seed=5, **SHORT)
+    fewest = min(np.unique(r.position).size for r in case.recorded.realizations)
+    assert fewest < 20
+    assert position_step(case.recorded) == pytest.approx(5e-3, rel=1e-9)
+
+
+def test_rounding_that_locks_in_some_periods_is_no_transient():
+    rng = np.random.default_rng(2)
+    period = np.sin(2 * np.pi * np.arange(2000) / 2000)
+    last = np.round(period / 0.2) * 0.2
+    first = np.round((period + rng.uniform(-0.1, 0.1, 2000)) / 0.2) * 0.2
+    assert unsettled(None, first, last, last) > TRANSIENT_LIMIT
+    assert unsettled(None, first, last, last, 0.2) == 0.0
+    decaying = last + np.exp(-np.arange(2000) / 200)
+    assert unsettled(None, decaying, last, last, 0.2) > TRANSIENT_LIMIT
+
+
+def test_a_record_with_noise_or_of_few_values_has_no_step():
+    fine = simulate_case(seed=5, **SHORT).recorded
+    assert position_step(fine) is None
+    still = [replace(r, position=np.zeros_like(r.position)) for r in fine.realizations]
+    assert position_step(replace(fine, realizations=tuple(still))) is None
+
+
+def test_rounding_has_the_variance_of_a_uniform_error():
+    samples = 4000
+    noise = np.random.default_rng(0).uniform(-0.5, 0.5, (400, samples)) * STEP
+    lines = np.fft.rfft(noise, axis=1)[:, :50] * (2.0 / samples)
+    lines[:, 0] *= 0.5
+    expected = np.sqrt(np.mean(np.abs(lines) ** 2, axis=0))
+    found = widened(np.zeros((1, 1, 50)), STEP, samples)[0, 0]
+    assert found[1:] == pytest.approx(np.full(49, expected[1:].mean()), rel=0.05)
+    assert found[0] == pytest.approx(expected[0], rel=0.15)
+
+
+def attribution(case, step):
+    recorded, simulator = case.recorded, Simulator(case.recorded)
+    std = noise_levels(recorded).of_outputs(recorded)
+    nominal = Model.nominal(PLANT.defaults()).plant
+    seen = widened(std, step, recorded.experiment.samples_per_period)
+    fitter = Fitter(recorded, simulator, seen, nominal, (0, 2), (1, 3))
+    refit = fitter.refit()
+    plain = Misfit(recorded, simulator, std, (0, 2)), Misfit(recorded, simulator, std, (1, 3))
+    return with_rounding(Attribution(refit, (), refit, (), True), plain, step), fitter
+
+
+def test_the_coarse_encoder_is_named_and_the_refit_is_left_as_it_is(coarse):
+    found, fitter = attribution(coarse, STEP)
+    assert found.best.effects == (ROUNDING,)
+    assert found.best.held_chi2 / fitter.held.size < 2.0
+    assert found.refit.held_chi2 > 1.25 * found.best.held_chi2
+    assert found.best.model.effects == {f"{ROUNDING}.resolution_rad": STEP}
+    assert found.best.model.plant == found.refit.model.plant
+
+
+def test_a_fine_encoder_is_not_named():
+    step = 1e-6
+    found, _ = attribution(
+        simulate_case({f"{ROUNDING}.resolution_rad": step}, seed=5, **SHORT), step
+    )
+    assert found.best.effects == ()

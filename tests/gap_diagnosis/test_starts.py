@@ -1,0 +1,115 @@
+"""Effects whose fit finds its way only from the right starting point, or only if it goes far."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from gap_cases import SHORT, fitter_of, simulate_case
+
+from gap_diagnosis.which.fits import Fit
+
+pytestmark = pytest.mark.slow
+
+
+def fitted(truth: dict[str, float], effect: str, more: bool = False) -> tuple[Fit, float]:
+    """Return the fit of an effect to a rig that has it, and its held-out misfit."""
+    fitter = fitter_of(simulate_case(truth, seed=3, **SHORT))[2]
+    refit = fitter.refit()
+    fit = fitter.add(refit, effect, fitter.screening(refit, effect).proposals())
+    if more and not fit.converged:
+        fit = fitter.continued(fit)
+    return fit, fit.held_chi2 / fitter.held.size
+
+
+@pytest.mark.parametrize(("inertia", "frequency", "damping"), [
+    (8e-4, 19.4, 0.013),
+    (2e-3, 33.0, 0.02),
+    (1e-2, 12.0, 0.03),
+    (3e-2, 46.0, 0.045),
+    (5e-2, 20.0, 0.017),
+    (1e-1, 39.0, 0.017),
+])  # fmt: skip
+def test_a_third_mass_is_found_light_and_narrow_or_heavy(inertia, frequency, damping):
+    truth = {
+        "extra_mode.inertia_kg_m2": inertia,
+        "extra_mode.frequency_hz": frequency,
+        "extra_mode.damping_ratio": damping,
+    }
+    fit, left = fitted(truth, "extra_mode")
+    assert fit.converged and left < 1.5
+    assert fit.model.effects["extra_mode.frequency_hz"] == pytest.approx(frequency, rel=0.01)
+    assert fit.model.effects["extra_mode.inertia_kg_m2"] == pytest.approx(inertia, rel=0.05)
+
+
+@pytest.mark.parametrize(("share", "knee"), [(0.45, 0.0), (0.7, 0.0), (0.85, 0.15)])
+def test_a_limit_is_found_wherever_it_clips(share, knee):
+    bare = simulate_case({}, seed=3, **SHORT)
+    peak = max(float(np.abs(r.torque).max()) for r in bare.recorded.realizations)
+    truth = {"torque_saturation.limit_nm": share * peak, "torque_saturation.knee": knee}
+    fit, left = fitted(truth, "torque_saturation")
+    assert fit.converged and left < 1.5
+    assert fit.model.effects["torque_saturation.limit_nm"] == pytest.approx(share * peak, rel=0.01)
+    assert fit.model.effects["torque_saturation.knee"] == pytest.approx(knee, abs=0.05)
+
+
+def test_an_eccentric_encoder_is_followed_along_its_valley():
+    truth = {"encoder_eccentricity.amplitude_rad": 0.12, "encoder_eccentricity.phase_rad": -0.6}
+    fit, left = fitted(truth, "encoder_eccentricity", more=True)
+    assert fit.converged and left < 1.5
+
+
+def test_an_effect_that_no_start_shows_is_found_if_a_step_from_there_gains():
+    """An eccentric encoder that errs in gain wants all bare parameters beyond their bounds."""
+    truth = {"encoder_eccentricity.amplitude_rad": 0.2, "encoder_eccentricity.phase_rad": 0.05}
+    case = simulate_case(truth, seed=1, noise_rad=2.8e-3, **SHORT)
+    fitter = fitter_of(case, tolerance=0.03)[2]
+    refit = fitter.refit()
+    proposals = fitter.screening(refit, "encoder_eccentricity").proposals()
+    assert proposals[0][0] > refit.train_chi2
+    fit = fitter.add(refit, "encoder_eccentricity", proposals)
+    assert fit.converged and fit.held_chi2 / fitter.held.size < 1.5
+
+
+@pytest.mark.parametrize(
+    "sizes",
+    [
+        {"motor_rad": 3e-5, "link_rad": 1e-5},
+        {"motor_rad": 4e-5, "link_rad": 3e-3},
+        {"motor_rad": 0.0, "link_rad": 1e-4},
+        {"motor_rad": 1e-3, "link_rad": 0.0},
+    ],
+)
+def test_presliding_is_found_on_either_side_or_both(sizes):
+    truth = {f"presliding_friction.{name}": value for name, value in sizes.items()}
+    fitter = fitter_of(simulate_case(truth, seed=4, **SHORT))[2]
+    refit = fitter.refit()
+    proposals = fitter.screening(refit, "presliding_friction").proposals()
+    fit = fitter.add(refit, "presliding_friction", proposals)
+    assert refit.held_chi2 / fitter.held.size > 5.0
+    assert fit.converged and fit.held_chi2 / fitter.held.size < 1.3
+    for name, value in truth.items():
+        assert fit.model.effects[name] == pytest.approx(value, rel=0.1, abs=1e-5)
+
+
+def test_an_eccentric_encoder_is_found_though_it_scales_the_parameters_by_a_fifth():
+    truth = {"encoder_eccentricity.amplitude_rad": 0.3, "encoder_eccentricity.phase_rad": 0.8}
+    fitter = fitter_of(simulate_case(truth, seed=4, **SHORT))[2]
+    refit = fitter.refit()
+    effect = "encoder_eccentricity"
+    fit = fitter.add(refit, effect, fitter.screening(refit, effect).proposals())
+    fit = fit if fit.converged else fitter.continued(fit)
+    assert refit.held_chi2 / fitter.held.size > 100.0
+    assert fit.converged and fit.held_chi2 / fitter.held.size < 1.3
+    assert fit.model.effects["encoder_eccentricity.amplitude_rad"] == pytest.approx(0.3, rel=0.2)
+
+
+@pytest.mark.parametrize(("share", "knee"), [(1.15, 0.3), (1.0, 0.1), (0.6, 0.2)])
+def test_a_drive_limit_is_found_even_if_only_its_knee_is_reached(share, knee):
+    bare = fitter_of(simulate_case(seed=4, **SHORT))[2]
+    limit = share * bare.peak_torque_nm
+    truth = {"torque_saturation.limit_nm": limit, "torque_saturation.knee": knee}
+    fitter = fitter_of(simulate_case(truth, seed=4, **SHORT))[2]
+    refit, effect = fitter.refit(), "torque_saturation"
+    fit = fitter.add(refit, effect, fitter.screening(refit, effect).proposals())
+    assert refit.held_chi2 / fitter.held.size > 2.0
+    assert fit.converged and fit.train_chi2 / fitter.train.size < 1.3
