@@ -28,8 +28,10 @@ from xdist.scheduler import LoadFileScheduling
 from fjr_cli.app import app
 
 # A machine that others share, or a kernel that compiles at its first call, is no fault of a test.
-settings.register_profile("untimed", deadline=None, suppress_health_check=[HealthCheck.too_slow])
-settings.load_profile("untimed")
+settings.register_profile("explore", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+# The same examples in every run; `--hypothesis-profile=explore` draws others.
+settings.register_profile("same", settings.get_profile("explore"), derandomize=True)
+settings.load_profile("same")
 
 os.environ[MARK] = uuid.uuid4().hex  # what waits look at, also where a test has no mark of its own
 

@@ -44,6 +44,7 @@ VALUES = GROUP.check(
     }
 )
 ROUNDING = 1e-9
+FIRST = 10  # a run may begin with any of its first samples
 DRIFT = 1.01  # of two clocks that count as one
 
 numbers = st.one_of(
@@ -73,7 +74,7 @@ class Hostile(RuleBasedStateMachine):
         self.stamp = 0  # of the newest position that was sent
         self.torque, self.said_ns, self.said_stamp = 0.0, self.now - MS, -MS
         self.untripped: list[tuple[int, int, float, int]] = []  # instant, stamp, position, run
-        self.run, self.released = 0, True
+        self.run, self.left = 0, True
         self.reason: str | None = None
         self.zero_by = NEVER
         self.soft_ns: int | None = None  # since when the torque rises softly from zero
@@ -82,11 +83,11 @@ class Hostile(RuleBasedStateMachine):
 
     # What is checked of every torque.
 
-    def hear(self, answers: list[tuple[int, float]]) -> None:
+    def hear(self, answers: list[tuple[int, float]], new_run: bool = False) -> None:
         for stamp, torque in answers:
             assert math.isfinite(torque) and abs(torque) <= TORQUE + ROUNDING
             least_s = (self.now - self.said_ns) * 1e-9
-            if stamp > self.said_stamp:  # of the same run
+            if not new_run:
                 least_s = min(least_s, (stamp - self.said_stamp) * 1e-9)
             falls = abs(torque) <= abs(self.torque) + ROUNDING and torque * self.torque >= 0.0
             changes = abs(torque - self.torque) <= RATE * least_s + ROUNDING
@@ -123,10 +124,12 @@ class Hostile(RuleBasedStateMachine):
         before, held = self.stamp, self.law.safety.held
         reference = self.references.pop(stamp, None)
         answers = self.loop.position(self.now, stamp, value)
-        new_run = bool(answers) and (stamp <= self.said_stamp or not self.run)
+        begins = stamp <= self.said_stamp or (self.left and stamp <= FIRST * MS)
+        new_run = bool(answers) and begins
         self.run += new_run
+        self.left = self.left and not new_run
         assert len(answers) <= 1 and all(said == stamp for said, _ in answers)
-        self.hear(answers)
+        self.hear(answers, new_run)
         if not answers:
             return
         self.stamp = stamp if new_run else max(stamp, before)
@@ -217,6 +220,7 @@ class Hostile(RuleBasedStateMachine):
     @rule()
     def leave_run(self) -> None:
         self.references.clear()
+        self.left = True
         self.loop.leave_run(self.values)
 
     @rule(samples=st.integers(0, 500))
