@@ -24,10 +24,10 @@ from .simulated_rig import Model
 
 Purpose = Literal["fit", "select", "report"]
 
-WINDOWS = 16
+WINDOWS = 24
 """Windows into which the shortest record is cut, at least."""
 _LONGEST_WINDOW_S = 4.0
-_WINDOWS_PER_BLOCK = 3
+_WINDOWS_PER_BLOCK = 2
 _PURPOSES: tuple[Purpose, ...] = ("fit", "select", "report")
 _CYCLE: tuple[Purpose, ...] = ("fit", "select", "fit", "report")  # of the blocks of one record
 _SIMULATION = 1e-3  # error of the simulation itself, relative to the rms of a cell

@@ -22,10 +22,11 @@ from .least_squares import Solution, solve
 from .screening import Proposal, Screening
 from .search_space import Space, space_for, starts
 
-_REFIT_ROUNDS = (8, 6, 6)
-_ADDED_ROUNDS = (10, 6)
+_REFIT_ROUNDS = (8, 5, 5)
+_ADDED_ROUNDS = (6, 4)
 _NO_PROMISE = 0.998  # of the parent's cost: a start that gains less is not pursued
 _STARTS = 2
+_RIVAL = 1.05  # a second start that costs more than this times the first is not pursued
 
 
 @dataclass(frozen=True)
@@ -92,6 +93,8 @@ class CellFitter:
         kept: list[Space] = []
         for cost, space, point in proposals:
             if cost > _NO_PROMISE * parent.solution.cost or len(kept) == _STARTS:
+                break
+            if cost > _RIVAL * proposals[0][0]:
                 break
             if any(space is one for one in kept):
                 continue

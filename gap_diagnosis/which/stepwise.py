@@ -17,7 +17,7 @@ from fjr_sim_node import effects as fx
 from .cell_fits import CellFit, CellFitter
 
 MOST_CAUSES = 4
-_PROPOSED, _FITTED = 8, 5
+_PROPOSED, _FITTED = 6, 4
 LEAST_T = 3.0
 LEAST_SHARE = 0.8
 LEAST_GAIN = 0.01
