@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -61,7 +62,7 @@ def _of_repeats(records: RecordSet) -> float | None:
     """Return the white part of what differs between repeats; None if there are none."""
     floors = []
     for group in records.repeats:
-        for one, other in zip(group[:-1], group[1:], strict=True):
+        for one, other in pairwise(group):
             difference = records.records[one].position - records.records[other].position
             floor = _floor(difference)
             if floor is None:

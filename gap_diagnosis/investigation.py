@@ -143,7 +143,10 @@ def investigate(
     }
     signals = {name: simulator.signals(each) for name, each in models.items()}
     maps = {name: residual_map(recorded, noise, *simulated) for name, simulated in signals.items()}
-    diagnosis = judge(recorded, std, gates, fitter, attribution, signals, maps, held_out=held_out)
+    diagnosis = judge(
+        recorded, std, gates, fitter, attribution, signals, maps, held_out=held_out,
+        known_noise=noise is not None,
+    )  # fmt: skip
     return Investigation(recorded, model, gates, noise, held, signals, maps, attribution, diagnosis)
 
 

@@ -16,10 +16,21 @@ from pathlib import Path
 import numpy as np
 
 from fjr_sim_node import effects as fx
-from gap_diagnosis.outcome.diagnosis import Candidate, Diagnosis, Estimate, Gaps, Verdict
+from gap_diagnosis.outcome.diagnosis import (
+    Candidate,
+    Diagnosis,
+    Estimate,
+    EvidenceKind,
+    Gaps,
+    Verdict,
+)
 from gap_diagnosis.which.search_space import starts
 
 from .baseline_fit import Problem, fit, jacobian
+
+NOTHING_HELD_OUT = EvidenceKind(
+    noise="repeats", reported_on="none", controller="known", excitation="periodic"
+)
 
 _UNDETECTED = 1.5  # chi2 per equation below which there is nothing left to explain
 _STEPS_OF_EFFECT = 3
@@ -67,7 +78,7 @@ def refit_only(folder: Path, nominal: Mapping[str, float]) -> Diagnosis:
     return Diagnosis(
         verdict=refit.without_effect if explained else "unexplained",
         confidence=1.0,
-        reported_on="none",
+        evidence=NOTHING_HELD_OUT,
         gap=refit.gaps,
         parameters=_estimates(refit.values),
     )
@@ -133,7 +144,7 @@ def _bic_verdict(refit: _Refit, outcomes: list[tuple[float, str, dict[str, float
         effects=[effect] if effect else [],
         equivalent=[[effect]] if effect else [],
         confidence=float(1.0 / weights.sum()),
-        reported_on="none",
+        evidence=NOTHING_HELD_OUT,
         gap=refit.gaps,
         ranking=[
             Candidate(
@@ -175,7 +186,7 @@ def sparse_regression(folder: Path, nominal: Mapping[str, float]) -> Diagnosis:
         effects=names,
         equivalent=[[name] for name in names],
         confidence=float(np.clip(1.0 - best / (left @ left), 0.0, 1.0)) if names else 1.0,
-        reported_on="none",
+        evidence=NOTHING_HELD_OUT,
         gap=refit.gaps,
         parameters=_estimates(refit.values),
     )

@@ -186,7 +186,9 @@ def _parts(records: RecordSet, hop: int) -> list[Part]:
             ends = np.linspace(0, count, blocks + 1).astype(int)
             for block in range(blocks):
                 purpose = _purpose(len(members), place, block)
-                parts.append(Part(index, level, slice(int(ends[block]), int(ends[block + 1])), purpose))
+                parts.append(
+                    Part(index, level, slice(int(ends[block]), int(ends[block + 1])), purpose)
+                )
     return parts
 
 

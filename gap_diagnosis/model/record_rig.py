@@ -52,12 +52,11 @@ class RecordSimulator:
         known = all(r.reference is not None and r.controller for r in records.records)
         self.loop: Loop = "known" if known else "unknown"
         self._starts = [_start(r, noise) for r in records.records]
-        self.crossover_hz: float | None = None
+        crossover_hz = CROSSOVER_SHARE * top_hz
+        self.crossover_hz: float | None = None if known else crossover_hz
+        self._observer = _observer(records, crossover_hz)
         if known:
             self._laws = [law_of(r.controller, self._rate) for r in records.records]
-        else:
-            self.crossover_hz = CROSSOVER_SHARE * top_hz
-            self._observer = _observer(records, self.crossover_hz)
 
     def run(self, models: Sequence[Model], which: Sequence[int]) -> list[list[np.ndarray]]:
         """Return y, u and q of each model in each run.
@@ -74,6 +73,29 @@ class RecordSimulator:
         found = run_parallel(self._one, jobs)
         return [found[i * len(which) : (i + 1) * len(which)] for i in range(len(models))]
 
+    def missing_torque(self, model: Model, which: Sequence[int]) -> list[np.ndarray]:
+        """Return the torque that an observer must add to hold a model to each recorded motion.
+
+        Returns:
+            float64 (samples,) for each run, N m; NaN where the motion diverges.
+        """
+        return run_parallel(self._missing, [(model, index) for index in which])
+
+    def _missing(self, job: tuple[Model, int]) -> np.ndarray:
+        model, index = job
+        record = self.records.records[index]
+        try:
+            return self._observed(model, index).torque - record.torque
+        except InputError:
+            return np.full(record.samples, np.nan)
+
+    def _observed(self, model: Model, index: int) -> Trajectory:
+        record, (p, e) = self.records.records[index], _coefficients(model)
+        return simulate_law(
+            record.position, self._rate, p, self._observer, None, e,
+            added_torque=record.torque, start=self._starts[index],
+        )  # fmt: skip
+
     def _one(self, job: tuple[Model, int]) -> np.ndarray:
         model, index = job
         try:
@@ -83,19 +105,14 @@ class RecordSimulator:
         return np.array([run.position, run.torque, run.motor if model.rigid else run.link])
 
     def _simulated(self, model: Model, index: int) -> Trajectory:
-        record, p, e = self.records.records[index], *_coefficients(model)
-        if self.loop == "known":
-            law, start = self._laws[index], self._starts[index]
-            assert record.reference is not None
-            if start == (0.0, 0.0):
-                return simulate(record.reference, self._rate, p, law, None, e)
-            return simulate_law(
-                record.reference, self._rate, p, _general(law), None, e, start=start
-            )
-        return simulate_law(
-            record.position, self._rate, p, self._observer, None, e,
-            added_torque=record.torque, start=self._starts[index],
-        )  # fmt: skip
+        if self.loop == "unknown":
+            return self._observed(model, index)
+        record, (p, e) = self.records.records[index], _coefficients(model)
+        law, start = self._laws[index], self._starts[index]
+        assert record.reference is not None
+        if start == (0.0, 0.0):
+            return simulate(record.reference, self._rate, p, law, None, e)
+        return simulate_law(record.reference, self._rate, p, _general(law), None, e, start=start)
 
 
 def _coefficients(model: Model) -> tuple[tuple[float, ...], tuple[float, ...] | None]:

@@ -19,6 +19,7 @@ Verdict = Literal[
     "bad_data",
 ]
 ReportedOn = Literal["records", "blocks", "none"]
+Stage = Literal["nominal", "refit", "cause"]
 LineKind = Literal["excited", "odd", "even", "dc", "slow", "all"]
 
 
@@ -118,14 +119,14 @@ class Place(ResultModel):
     """Where the gap lies: a band of one level, one kind of line, one signal.
 
     Records that are not periodic have no kinds of line but `slow` (mean and slow motion) and `all`.
-    Sigma is the rms error over the standard deviation of the noise; None where noise is not known.
+    Sigma is the rms error over the standard deviation of the noise; NaN where noise is not known.
     """
 
     level: int
     band_hz: Annotated[tuple[float, float], Unit("Hz")]
     lines: LineKind
     signal: Literal["position", "torque"]
-    sigma: OptionalNumber
+    sigma: Number
 
 
 class Cause(ResultModel):
@@ -163,7 +164,7 @@ class Step(ResultModel):
     """
 
     added: str | None
-    stage: Literal["nominal", "refit", "cause"]
+    stage: Stage
     nrmse_position: OptionalNumber
     nrmse_torque: OptionalNumber
     chi2_per_dof: OptionalNumber

@@ -138,9 +138,7 @@ class Stepwise:
             chosen.append(effect)
         fits = []
         for number, effect in enumerate(chosen, 1):
-            self._progress(
-                f"{' + '.join((*parent.effects, effect))} ({number} of {len(chosen)})"
-            )
+            self._progress(f"{' + '.join((*parent.effects, effect))} ({number} of {len(chosen)})")
             fit = self._fitter.add(parent, effect, proposals[effect])
             if fit is not None:
                 fits.append(fit)
