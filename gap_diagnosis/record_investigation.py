@@ -17,7 +17,7 @@ from .outcome.diagnosis import Diagnosis
 from .record_judgement import Tested, judge_records, tested_causes
 from .which.cell_fits import CellFitter, catalogue
 from .which.search_space import TOLERANCE
-from .which.stepwise import TIED_SHARE, TIED_T, Found, Stepwise, gain
+from .which.stepwise import Found, Stepwise, gain, stands_for
 
 Progress = Callable[[str], None]
 
@@ -129,7 +129,8 @@ def _kept(fitter: CellFitter, found: Found, progress: Progress) -> tuple[Found, 
         before = [fit for fit in steps if weakest.effect not in fit.effects]
         last = weakest.without
         steps = before if last.effects == before[-1].effects else [*before, last]
-        if last.effects == before[-1].effects and last.scores.mean() > before[-1].scores.mean():
+        same = last.effects == before[-1].effects
+        if same and fitter.gains(last, before[-1]).sum() > 0.0:
             steps[-1] = last
         tested = []
     return replace(found, steps=steps), tested
@@ -147,10 +148,7 @@ def _alternatives(
         other = fitter.add(tested.without, effect, proposals) if proposals else None
         if other is None:
             continue
-        behind = gain(best, other)
-        if behind.mean < TIED_SHARE * tested.gain.mean or (
-            behind.t < TIED_T and behind.mean < 0.5 * tested.gain.mean
-        ):
+        if stands_for(gain(fitter, best, other), tested.gain.mean):
             tied.append(effect)
     return tied
 

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import norm
 
 from .model.evidence import Evidence
 from .model.simulated_rig import Model
@@ -41,7 +40,7 @@ NOTHING_LEFT = 2.0
 """Mean squared error over noise below which noise explains what is left."""
 PLAIN = 4.0
 """The same for the refit where no effect gains anything."""
-FEWEST_PARTS = 3
+FEWEST_PARTS = 6
 """Parts that select, below which the evidence is too thin for any name."""
 _DRAWS = 1000
 _MOST_PLACES = 4
@@ -79,7 +78,7 @@ class Tested:
     @property
     def present(self) -> float:
         """Probability that it is there."""
-        sure = float(norm.cdf(0.5 * (self.gain.t - 2.0))) * min(1.0, self.gain.share + 0.1)
+        sure = (1.0 - min(1.0, 5.0 * self.gain.p)) * min(1.0, self.gain.share + 0.1)
         if not self.certain:
             sure *= 0.5
         if self.invariance_p is not None and self.invariance_p < LEAST_INVARIANCE_P:
@@ -96,7 +95,7 @@ def tested_causes(fitter: CellFitter, fit: CellFit, groups: np.ndarray) -> list[
         found.append(
             Tested(
                 effect,
-                gain(fit, without),
+                gain(fitter, fit, without),
                 without,
                 invariance(fitter, fit, effect),
                 beyond_zero(effect, estimates),
@@ -262,7 +261,7 @@ def judge_records(
         gap=Gaps(**gaps, noise_floor=None),
         gap_closed=_closed(ledger, refit.model, best.model) if causes else None,
         where=ledger.places_of_error(refit.model),
-        ranking=_ranking(found),
+        ranking=_ranking(fitter, found),
         parameters=estimates,
         notes=[*([THIN] if thin else []), *notes],
     )
@@ -319,7 +318,7 @@ def _verdict(
     return "unexplained"
 
 
-def _ranking(found: Found) -> list[Candidate]:
+def _ranking(fitter: CellFitter, found: Found) -> list[Candidate]:
     ranked = []
     for count, fits in found.rivals.items():
         parent = found.steps[min(count, len(found.steps)) - 1]
@@ -329,7 +328,7 @@ def _ranking(found: Found) -> list[Candidate]:
                 Candidate(
                     effects=list(fit.effects),
                     held_out_chi2=None,
-                    delta=gain(fit, parent).mean,
+                    delta=gain(fitter, fit, parent).mean,
                     converged=fit.solution.converged,
                     parameters={
                         n: {"value": fit.model.effects[n], "low": math.nan, "high": math.nan}

@@ -39,7 +39,8 @@ class CellFit:
         model: the fitted model.
         solution: the optimiser's end, its residuals in standard deviations of `variance`.
         variance: (cells,), of an error in each cell, rad2.
-        scores: (parts,), log-likelihood per number of the parts that select, by their order.
+        left: (parts, bands), mean square of what is left on each part that selects, noise and the
+            simulation's own error added, rad2.
     """
 
     effects: tuple[str, ...]
@@ -47,7 +48,7 @@ class CellFit:
     model: Model
     solution: Solution
     variance: np.ndarray
-    scores: np.ndarray
+    left: np.ndarray
 
 
 class CellFitter:
@@ -68,6 +69,15 @@ class CellFitter:
         self._cell = evidence.cell_of(self.fit_parts)
         self._floor = evidence.floor(self.fit_parts)
         self.groups = evidence.part_of(self.fit_parts)
+        evidence = self.evidence
+        bands = evidence.cell_of(self.select_parts) % evidence.bands
+        place = {part: k for k, part in enumerate(self.select_parts)}
+        of_part = np.array([place[p] for p in evidence.part_of(self.select_parts)])
+        self._select_bins = of_part * evidence.bands + bands
+        shape = len(self.select_parts), evidence.bands
+        self._counts = np.bincount(self._select_bins, minlength=shape[0] * shape[1]).reshape(shape)
+        levels = [evidence.records.levels.index(evidence.parts[p].level) for p in self.select_parts]
+        self._select_floor = self._floor.reshape(-1, evidence.bands)[levels]
         self._peak = max(float(np.abs(r.torque).max()) for r in evidence.records.records)
 
     def refit(self) -> CellFit:
@@ -103,7 +113,7 @@ class CellFitter:
             fit = self._reweighted(
                 (*parent.effects, effect), space, point, parent.variance, _ADDED_ROUNDS, known
             )
-            if best is None or fit.scores.mean() > best.scores.mean():
+            if best is None or self.gains(fit, best).sum() > 0.0:
                 best = fit
         return best
 
@@ -118,15 +128,25 @@ class CellFitter:
         rest = tuple(e for e in fit.effects if e != effect)
         return self._reweighted(rest, space, start, fit.variance, _ADDED_ROUNDS)
 
-    def score(self, model: Model, variance: np.ndarray, parts: Sequence[int]) -> np.ndarray:
-        """Return the log-likelihood per number of each part, (parts,)."""
-        evidence = self.evidence
-        errors = evidence.errors([model], parts)[0]
-        v = variance[evidence.cell_of(parts)]
-        each = -0.5 * (np.log(v) + errors**2 / v)
-        place = {part: k for k, part in enumerate(parts)}
-        part = np.array([place[p] for p in evidence.part_of(parts)])
-        return np.bincount(part, each) / np.bincount(part)
+    def gains(self, after: CellFit, before: CellFit) -> np.ndarray:
+        """Return the log-likelihood that one fit gains over another on each part that selects.
+
+        With the variance of each band of each part unknown it is n/2 ln(left before/left after),
+        summed over bands of n numbers: no part counts by its size, and no outlier by its square.
+
+        Returns:
+            (parts,), nats.
+        """
+        counts = self._counts
+        return 0.5 * np.sum(counts * np.log(before.left / after.left), axis=1)
+
+    def _left(self, model: Model) -> np.ndarray:
+        parts = self.select_parts
+        errors = self.evidence.errors([model], parts)[0]
+        bins = self._select_bins
+        squares = np.bincount(bins, errors**2, len(parts) * self.evidence.bands)
+        mean = squares.reshape(len(parts), -1) / self._counts
+        return mean + self._select_floor
 
     def _space(self, parent: CellFit, seed: Mapping[str, float]) -> Space:
         added = space_for(self.nominal, seed)
@@ -171,8 +191,7 @@ class CellFitter:
             cost=float(np.sum(errors**2 / variance[self._cell])),
         )
         model = space.model(x)
-        scores = self.score(model, variance, self.select_parts)
-        return CellFit(effects, space, model, ended, variance, scores)
+        return CellFit(effects, space, model, ended, variance, self._left(model))
 
 
 def catalogue(nominal: Mapping[str, float], asked: Sequence[str] | None = None) -> list[str]:
