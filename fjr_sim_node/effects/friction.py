@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from .entry import Effect, EffectParameter, ripple, ripple_starts, size
 
-_STRIBECK_STARTS = ({"torque_nm": (0.3, 2.0), "velocity_rad_s": (0.02, 0.1, 0.5)},)
+_STRIBECK_STARTS = ({"torque_nm": (0.002, 0.015), "velocity_rad_s": (0.0025, 0.0125, 0.06, 0.3)},)
+_SHORT = (3e-4, 3e-3, 3e-2)
 _ARMSTRONG = "Armstrong-Helouvry, Dupont, Canudas de Wit 1994, Automatica 30(7)"
 
 
@@ -13,7 +14,7 @@ def _stribeck(side: str) -> tuple[EffectParameter, ...]:
         size("torque_nm", "N m", f"Breakaway above Coulomb friction, {side} side"),
         EffectParameter(
             "velocity_rad_s", 0.1, "rad/s", "Stribeck velocity, where it has fallen to 1/e",
-            1e-4, 100.0, fit=(0.01, 5.0),
+            1e-4, 100.0, fit=(1e-3, 0.6),
         ),
     )  # fmt: skip
 
@@ -53,8 +54,8 @@ FRICTION: tuple[Effect, ...] = (
                  "the directions", -1e4),
         ),
         (
-            {"coulomb_nm": (0.3,), "viscous_nm_s_rad": (0.0,)},
-            {"coulomb_nm": (0.0,), "viscous_nm_s_rad": (0.2,)},
+            {"coulomb_nm": (0.002,), "viscous_nm_s_rad": (0.0,)},
+            {"coulomb_nm": (0.0,), "viscous_nm_s_rad": (0.01,)},
         ),
         looks_like="constant torque",
         same_as="a torque bias while the motor slides, where only Coulomb friction differs",
@@ -68,12 +69,12 @@ FRICTION: tuple[Effect, ...] = (
         "Dahl 1968, TOR-158(3107-18); de Wit et al. 1995, IEEE TAC 40(3), without bristle damping",
         (
             size("motor_rad", "rad", "Displacement over which motor friction builds up", 0.0, 1.0,
-                 negligible=2e-6),
+                 negligible=3e-5),
             size("link_rad", "rad", "Displacement over which link friction builds up", 0.0, 1.0,
-                 negligible=2e-6, of_link=True),
+                 negligible=3e-5, of_link=True),
         ),
         # A side that starts below what is negligible never leaves it.
-        ({"motor_rad": (2e-5, 2e-4, 2e-3), "link_rad": (2e-5, 2e-4, 2e-3)},),
+        ({"motor_rad": _SHORT, "link_rad": _SHORT},),
     ),
     Effect(
         "load_friction",
@@ -93,7 +94,7 @@ FRICTION: tuple[Effect, ...] = (
         "even lines, small gain",
         "Armstrong 1988, position-dependent friction of geared joints",
         ripple("amplitude_nm", "N m", 1e4, "the variation of Coulomb friction"),
-        ripple_starts("amplitude_nm", 0.3),
+        ripple_starts("amplitude_nm", 0.002),
         ripple=True,
     ),
     Effect(
@@ -108,8 +109,8 @@ FRICTION: tuple[Effect, ...] = (
             size("link_nm_s2_rad2", "N m s2/rad2", "Drag on the link", of_link=True),
         ),
         (
-            {"motor_nm_s2_rad2": (0.05,), "link_nm_s2_rad2": (0.0,)},
-            {"motor_nm_s2_rad2": (0.0,), "link_nm_s2_rad2": (0.05,)},
+            {"motor_nm_s2_rad2": (0.02,), "link_nm_s2_rad2": (0.0,)},
+            {"motor_nm_s2_rad2": (0.0,), "link_nm_s2_rad2": (0.02,)},
         ),
     ),
     Effect(

@@ -85,7 +85,7 @@ def _features(refit: _Refit, basis: np.ndarray) -> list[tuple[str, dict[str, flo
             continue
         effect = entry.identifier
         cycles = _CYCLES if entry.ripple else None
-        for point in starts(effect, refit.problem.peak_torque_nm, cycles):
+        for point in starts(effect, refit.problem.scales, cycles):
             residual = refit.problem.residual({**refit.values, **point})
             if np.isfinite(residual).all():
                 found.append((effect, point, _projected(basis, residual - refit.residual)))

@@ -477,6 +477,18 @@ def test_delay_of_whole_samples_is_the_shifted_torque(samples, rate):
     assert np.array_equal(delayed, exact)
 
 
+def test_a_delay_of_a_tenth_of_a_second_is_remembered_at_the_highest_rate():
+    steps = np.where(np.arange(2100) < 50, 30.0, 0.0)
+    late = Rig({}, named("delay", time_s=0.1)).play(steps, 1.0 / 20_000.0)
+    assert not late[:2000, 2].any() and late[2001:, 2].all()
+    now = Rig({}, named("load_friction", coefficient=1e-300)).play(steps[:100], 1.0 / 20_000.0)
+    assert np.array_equal(late[2000:, 2], now[:, 2])
+
+
+def test_a_delay_beyond_what_is_remembered_is_no_motion():
+    assert np.isnan(Rig({}, named("delay", time_s=0.1)).hold(30.0, 5e-6)[2])
+
+
 @pytest.mark.parametrize("fifths", [1, 2, 8])
 def test_fractional_delay_is_the_shift_on_a_finer_grid(fifths):
     delayed = Rig({}, named("delay", time_s=fifths * 2e-4)).play(TORQUE)
