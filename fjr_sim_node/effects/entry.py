@@ -33,6 +33,8 @@ class EffectParameter(Parameter):
             stiff, relative.
         absolute: whether fits take it in its unit whatever the record, as what belongs to one turn.
         of_link: whether it belongs to the link alone, which a rigid axis does not have.
+        adds_to: bare parameter that it adds to, for datasheets that lack it: fits free it only
+            where that is zero. Empty for all others.
     """
 
     role: Role = "shape"
@@ -40,6 +42,7 @@ class EffectParameter(Parameter):
     negligible: float = 0.0
     absolute: bool = False
     of_link: bool = False
+    adds_to: str = ""
 
     def fit_bounds(self, scale: float) -> tuple[float, float]:
         """Return the least and the greatest value that a fit may take.
@@ -76,6 +79,10 @@ class Effect:
         same_as: what it equals exactly, in words; empty if nothing.
         ripple: whether it is periodic in the motor angle, so that `cycles_per_turn` is searched.
         scales: whether it scales the parameters of the bare plant, wholly or about one angle.
+        of_bare_plant: whether it is the bare plant with other values, so that its kernel is the
+            bare one.
+        axis: which axes can have it; empty: flexible ones if it acts on transmission or link, else
+            both.
     """
 
     identifier: str
@@ -90,6 +97,8 @@ class Effect:
     same_as: str = ""
     ripple: bool = False
     scales: bool = False
+    of_bare_plant: bool = False
+    axis: Literal["", "both", "rigid"] = ""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -105,7 +114,12 @@ class Effect:
     @property
     def on_rigid_axis(self) -> bool:
         """Whether a rig without a flexible transmission can have it."""
-        return self.acts_on not in ("transmission", "link")
+        return bool(self.axis) or self.acts_on not in ("transmission", "link")
+
+    @property
+    def on_flexible_axis(self) -> bool:
+        """Whether a rig with a flexible transmission can have it."""
+        return self.axis != "rigid"
 
     @property
     def full_parameters(self) -> tuple[EffectParameter, ...]:
@@ -127,11 +141,13 @@ def size(
     of_link: bool = False,
     fit: tuple[float, float] | None = None,
     absolute: bool = False,
+    adds_to: str = "",
 ) -> EffectParameter:
     """Return a size: zero while the effect is off."""
     return EffectParameter(
         name, 0.0, unit, description, low, high,
         role="size", fit=fit, negligible=negligible, of_link=of_link, absolute=absolute,
+        adds_to=adds_to,
     )  # fmt: skip
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .entry import Effect, EffectParameter, ripple, ripple_starts, size
+from .entry import Effect, EffectParameter, Start, ripple, ripple_starts, size
 
 _STRIBECK_STARTS = ({"torque_nm": (0.002, 0.015), "velocity_rad_s": (0.0025, 0.0125, 0.06, 0.3)},)
 _SHORT = (3e-4, 3e-3, 3e-2)
@@ -19,7 +19,47 @@ def _stribeck(side: str) -> tuple[EffectParameter, ...]:
     )  # fmt: skip
 
 
+def _lacking(
+    quantity: str, name: str, unit: str, motor: str, link: str
+) -> tuple[EffectParameter, ...]:
+    return (
+        size(f"motor_{name}", unit, f"{quantity} of the motor beyond {motor}", adds_to=motor),
+        size(f"link_{name}", unit, f"{quantity} of the link beyond {link}", adds_to=link,
+             of_link=True),
+    )  # fmt: skip
+
+
+def _on_either_side(name: str, values: tuple[float, ...]) -> tuple[Start, ...]:
+    motor, link = f"motor_{name}", f"link_{name}"
+    both = tuple({motor: (value,), link: (value,)} for value in values)
+    return ({motor: values, link: (0.0,)}, {motor: (0.0,), link: values}, *both)
+
+
 FRICTION: tuple[Effect, ...] = (
+    Effect(
+        "coulomb_friction",
+        "There is Coulomb friction where the datasheet has none.",
+        "motor",
+        "plant.flexible_joint:with_added",
+        "low amplitude, damped at all frequencies",
+        "paper eq. 2, fs sgn(q')",
+        _lacking("Coulomb friction", "nm", "N m", "fsm", "fs"),
+        _on_either_side("nm", (0.02, 0.2)),
+        same_as="a larger fsm or fs",
+        of_bare_plant=True,
+    ),
+    Effect(
+        "viscous_friction",
+        "There is viscous friction where the datasheet has none.",
+        "motor",
+        "plant.flexible_joint:with_added",
+        "resonance damped at all amplitudes, low frequencies lower",
+        "paper eq. 2, fv q'",
+        _lacking("Viscous friction", "nm_s_rad", "N m s/rad", "fvm", "fv"),
+        _on_either_side("nm_s_rad", (0.02,)),
+        same_as="a larger fvm or fv",
+        of_bare_plant=True,
+    ),
     Effect(
         "stribeck_friction_motor",
         "Motor friction is higher at breakaway and falls with velocity.",

@@ -1,4 +1,4 @@
-"""The table of effects: transmission and link, which a rigid axis does not have."""
+"""The table of effects: transmission and link."""
 
 from __future__ import annotations
 
@@ -111,5 +111,29 @@ TRANSMISSION: tuple[Effect, ...] = (
         ({"torque_nm": (0.003, 0.03), "angle_rad": (0.0, np.pi / 2, np.pi)},),
         looks_like="constant torque",
         same_as="cogging of one cycle per turn, on a rigid axis",
+        axis="both",
+    ),
+    Effect(
+        "transmission_stiffness",
+        "The transmission yields where the datasheet has it rigid.",
+        "transmission",
+        "plant.flexible_joint:with_added",
+        "resonance and antiresonance where an inertia alone has none",
+        "paper eqs. 2 and 3 with k1 = 0; Spong 1987, ASME J. Dyn. Syst. 109(4)",
+        (
+            size("compliance_rad_nm", "rad/N m", "Deflection per transmitted torque, 1/k0",
+                 negligible=1e-3),
+            EffectParameter("link_inertia_share", 0.5, "", "Share of the inertia behind the "
+                            "transmission", 0.01, 0.99),
+            EffectParameter("link_friction_share", 0.0, "", "Share of Coulomb and viscous friction "
+                            "behind the transmission", 0.0, 1.0),
+        ),
+        (
+            {"compliance_rad_nm": (0.02, 0.2, 1.0), "link_inertia_share": (0.3, 0.7),
+             "link_friction_share": (0.3,)},
+        ),
+        same_as="a finite k0",
+        of_bare_plant=True,
+        axis="rigid",
     ),
 )  # fmt: skip

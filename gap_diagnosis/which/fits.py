@@ -16,7 +16,7 @@ from ..model.simulated_rig import Model, Simulator
 from .least_squares import Solution, solve
 from .ripples import RippleSearch
 from .screening import Proposal, Screening
-from .search_space import TOLERANCE, Scales, Space, space_for, starts
+from .search_space import TOLERANCE, Scales, Space, catalogue, space_for, starts
 
 _KEPT_STARTS = 2
 _MOST_STEPS = 40
@@ -100,13 +100,8 @@ class Fitter:
 
     @property
     def catalogue(self) -> list[str]:
-        """Effects that this rig can have: a rigid axis has none of transmission and link."""
-        rigid = "k0" not in self.nominal
-        return [
-            effect.identifier
-            for effect in fx.CATALOGUE
-            if effect.starts and (effect.on_rigid_axis or not rigid)
-        ]
+        """Effects that this rig can have."""
+        return catalogue(self.nominal)
 
     def refit(self) -> Fit:
         """Fit the base parameters alone, level after level added from the lowest amplitude up.
@@ -171,7 +166,7 @@ class Fitter:
         return Screening(
             parent.solution,
             parent.model,
-            starts(effect, self.scales, cycles),
+            starts(effect, self.scales, cycles, self.nominal),
             partial(self.space, parent),
             self.errors,
         )
@@ -248,7 +243,7 @@ class Fitter:
         cost, space, start = proposal
         if cost > parent.train_chi2:
             seed = dict.fromkeys(fx.EFFECTS[effect].names, 0.0)
-            seed.update(starts(effect, self.scales)[0])
+            seed.update(starts(effect, self.scales, nominal=self.nominal)[0])
             space = self.space(parent, seed)
             start = np.clip(space.point(parent.model), *space.bounds())
         fit = self.solve(names, space, start, most_steps=1, known=parent.solution.jacobian)

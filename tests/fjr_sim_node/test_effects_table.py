@@ -15,6 +15,7 @@ import pytest
 from paths import ROOT
 
 from fjr_sim_node import effects as fx
+from fjr_sim_node.plant import PLANT, with_added
 
 PACKAGES = [path.parent.name for path in ROOT.glob("*/__init__.py")]
 
@@ -37,8 +38,21 @@ def test_every_parameter_is_read_by_a_kernel() -> None:
     sources = "".join(
         inspect.getsource(importlib.import_module(f"fjr_sim_node.{name}")) for name in kernels
     )
-    for name in fx.NAMES:
-        assert f"fx.{name.upper().replace('.', '_')}" in sources
+    for effect in fx.CATALOGUE:
+        for name in () if effect.of_bare_plant else effect.names:
+            assert f"fx.{name.upper().replace('.', '_')}" in sources
+
+
+def test_effects_of_the_bare_plant_change_its_parameters_and_need_no_kernel() -> None:
+    found = [effect for effect in fx.CATALOGUE if effect.of_bare_plant]
+    assert len(found) == 3
+    for effect in found:
+        values = PLANT.defaults() | {"k0": math.inf if effect.axis == "rigid" else 1500.0}
+        sizes = dict.fromkeys(effect.names, 0.5)
+        assert fx.coefficients(sizes) is None
+        for name in effect.names:
+            one = with_added(values | sizes | {name: 0.25})
+            assert one != with_added(values | sizes), name
 
 
 def test_starts_name_parameters_of_their_effect_within_their_bounds() -> None:
