@@ -21,6 +21,8 @@ APART = {"k0": 0.0, "k1": 0.0}
 CONTROLLER = pd_filtered.coefficients(pd_filtered.CONTROLLER.defaults())
 
 MODERATE = {
+    "coulomb_friction": {"motor_nm": 2.0, "link_nm": 1.0},
+    "viscous_friction": {"motor_nm_s_rad": 1.0, "link_nm_s_rad": 0.5},
     "stribeck_friction_motor": {"torque_nm": 2.0, "velocity_rad_s": 0.05},
     "stribeck_friction_link": {"torque_nm": 2.0, "velocity_rad_s": 0.05},
     "asymmetric_friction": {"coulomb_nm": 1.0, "viscous_nm_s_rad": 0.5},
@@ -48,6 +50,11 @@ MODERATE = {
     },
     "extra_mode": {"inertia_kg_m2": 0.03, "frequency_hz": 30.0, "damping_ratio": 0.02},
     "gravity": {"torque_nm": 3.0, "angle_rad": 0.5},
+    "transmission_stiffness": {
+        "compliance_rad_nm": 1e-3,
+        "link_inertia_share": 0.6,
+        "link_friction_share": 0.4,
+    },
     "cogging": {
         "amplitude_nm": 1.0,
         "cycles_per_turn": 24.0,
@@ -71,12 +78,18 @@ def named(identifier: str, **values: float) -> dict[str, float]:
     return {f"{identifier}.{name}": value for name, value in values.items()}
 
 
-def moderate(*identifiers: str) -> tuple[float, ...] | None:
-    """Return the coefficients with these effects at a moderate size."""
+def moderate(*identifiers: str) -> dict[str, float]:
+    """Return the parameters of these effects at a moderate size."""
     together: dict[str, float] = {}
     for identifier in identifiers:
         together |= named(identifier, **MODERATE[identifier])
-    return effects.coefficients(together)
+    return together
+
+
+def axis(*identifiers: str) -> dict[str, float]:
+    """Return what makes an axis one that can have these effects: rigid, where only such can."""
+    flexible = all(effects.EFFECTS[identifier].on_flexible_axis for identifier in identifiers)
+    return {} if flexible else {"k0": math.inf}
 
 
 @dataclass
@@ -95,8 +108,10 @@ class Rig:
     x: np.ndarray = field(default_factory=rig.at_rest)
 
     def __post_init__(self) -> None:
-        self.values = plant.PLANT.check(self.plant)
-        self.p = plant.coefficients(self.values)
+        given = {**plant.PLANT.check(self.plant), **self.effects}
+        self.values = plant.with_added(given)
+        self.one_body = plant.moves_as_one(given)
+        self.p = plant.coefficients(given)
         self.e = effects.coefficients(self.effects)
 
     def start(self, q=0.0, vq=0.0, th=0.0, vth=0.0) -> Rig:
@@ -121,6 +136,8 @@ class Rig:
         e = effects.DEFAULTS if self.e is None else self.e
         get = dict(zip(effects.NAMES, e, strict=True)).__getitem__
         q, vq, th, vth, q3, v3, _, link, motor, flex = self.x[:10]
+        if self.one_body:
+            q, vq, v = th, vth, {**v, "k0": 0.0, "k1": 0.0}
         rate = 2.0 * math.pi * get("extra_mode.frequency_hz")
         third = 0.5 * get("extra_mode.inertia_kg_m2") * (v3**2 + (rate * (q3 - q)) ** 2)
         ripple, cycles = get("cogging.amplitude_nm"), get("cogging.cycles_per_turn")
@@ -191,12 +208,15 @@ def multisine_reference(amplitude: float, seed: int = 1) -> np.ndarray:
     return multisine.reference(multisine.describe(values, 0, 0))
 
 
-def simulate(reference, e, elapsed_s=0.0, noise=None, **plant_values):
-    """Simulate the paper's loop with effects."""
+def simulate(reference, on, elapsed_s=0.0, noise=None, **plant_values):
+    """Simulate the paper's loop with effects: parameters by full name, or coefficients, or None."""
+    bare, e = plant.PLANT.check(plant_values), on
+    if isinstance(on, dict):
+        bare, e = bare | on, effects.coefficients(on)
     return closed_loop.simulate(
         reference,
         RATE,
-        plant.coefficients(plant.PLANT.check(plant_values)),
+        plant.coefficients(bare),
         CONTROLLER,
         noise,
         e,

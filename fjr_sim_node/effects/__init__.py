@@ -4,7 +4,8 @@ An entry (`entry.Effect`) holds identifier, law, parameters with unit, bounds an
 effect acts on, starts of fits, near and exact equivalents, and telltale. Node parameters, parameter
 files, fits, documents and reports all read it. To add an effect, add its entry to `friction`,
 `transmission` or `drive` and write its law (`plant.torques` or `simulation.rig`), where
-`fx.EFFECT_PARAMETER`, in capitals, is the place of a parameter among the coefficients.
+`fx.EFFECT_PARAMETER`, in capitals, is the place of a parameter among the coefficients. What is the
+bare plant with other values (friction that a datasheet lacks) needs no kernel: `plant.with_added`.
 
 An effect is off while its sizes have their defaults; then the plant is the bare one, bit for bit.
 Parameter names in files and in ROS are `effect.parameter`.
@@ -48,7 +49,12 @@ DEFAULTS: tuple[float, ...] = tuple(float(parameter.default) for parameter in PA
 
 _BY_NAME = {parameter.name: parameter for parameter in PARAMETERS}
 _PLACES = {name.upper().replace(".", "_"): place for place, name in enumerate(NAMES)}
-_SIZES = tuple(NAMES.index(name) for effect in CATALOGUE for name in effect.size_names)
+_SIZES = tuple(
+    NAMES.index(name)
+    for effect in CATALOGUE
+    if not effect.of_bare_plant
+    for name in effect.size_names
+)
 
 
 def __getattr__(name: str) -> int:
@@ -73,7 +79,9 @@ def near_equivalents(identifier: str) -> frozenset[str]:
 
 
 def coefficients(values: Mapping[str, Any]) -> tuple[float, ...] | None:
-    """Return the effects' parameters in the order of `NAMES`; None if all are off.
+    """Return the effects' parameters in the order of `NAMES`; None if no kernel needs them.
+
+    Those of effects of the bare plant are in `plant.coefficients`.
 
     Args:
         values: checked parameter values by full name; missing ones have their defaults.

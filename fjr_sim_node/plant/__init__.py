@@ -13,7 +13,9 @@ from .flexible_joint import (
     advance,
     advance_with_effects,
     coefficients,
+    moves_as_one,
     rigid_sums,
+    with_added,
 )
 
 __all__ = [
@@ -29,5 +31,7 @@ __all__ = [
     "advance",
     "advance_with_effects",
     "coefficients",
+    "moves_as_one",
     "rigid_sums",
+    "with_added",
 ]

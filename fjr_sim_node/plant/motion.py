@@ -84,13 +84,13 @@ def link_torque(s, te, p, e):
 
 
 @inlined
-def motor_torque(s, te, torque, e):
+def motor_torque(s, te, torque, p, e):
     """Return the torque that drives the motor against its Coulomb friction."""
     if e is None:
-        return motor_drive(s[2], te, torque, e)
+        return motor_drive(s[2], te, torque, p, e)
     if e[fx.ACTUATOR_LAG_TIME_CONSTANT_S] != 0.0:
         torque = s[6]
-    return motor_drive(s[2], te, torque, e)
+    return motor_drive(s[2], te, torque, p, e)
 
 
 @inlined
@@ -104,7 +104,7 @@ def derivative(s, torque, m, w, p, e):
         aq = (link_torque(s, te, p, e) - friction) / p[J]
     if m[1] != 0.0:
         friction = motor_viscous(s[3], p, e) + motor_friction(s, te, m, w, p, e)
-        ath = (motor_torque(s, te, torque, e) - friction) / p[JM]
+        ath = (motor_torque(s, te, torque, p, e) - friction) / p[JM]
     if e is None:
         return s[1], aq, s[3], ath, 0.0, 0.0, 0.0
     a3 = 0.0

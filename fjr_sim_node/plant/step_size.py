@@ -22,6 +22,7 @@ from .torques import (
     J,
     deflection,
     deflection_speed,
+    is_rigid,
     motor_level_bound,
 )
 
@@ -37,7 +38,11 @@ def pushes(s, torque, w, p, e):
     motor += e[fx.COGGING_AMPLITUDE_NM] * (1.0 + e[fx.COGGING_SECOND_RATIO])
     if p[MOTOR_BRISTLES] != 0.0:
         motor += max(abs(w[1]), motor_level_bound(0.0, p, e))
-    link = e[fx.GRAVITY_TORQUE_NM] + e[fx.HYSTERESIS_TORQUE_NM]
+    link = e[fx.HYSTERESIS_TORQUE_NM]
+    if is_rigid(p):
+        motor += e[fx.GRAVITY_TORQUE_NM]
+    else:
+        link += e[fx.GRAVITY_TORQUE_NM]
     if p[LINK_BRISTLES] != 0.0:
         link += max(abs(w[0]), p[FS] + e[fx.STRIBECK_FRICTION_LINK_TORQUE_NM])
     if e[fx.EXTRA_MODE_INERTIA_KG_M2] != 0.0:
@@ -113,8 +118,12 @@ def _fastest_rate(stiffness, twist, decay, s, p, e):
     )
     ratio = 1.0 + slope
     mobility = 1.0 / p[J] + ratio * (ratio + e[fx.LOAD_FRICTION_COEFFICIENT]) / p[JM]
-    link = e[fx.GRAVITY_TORQUE_NM]
-    motor = (
+    link, motor = p[LINK_BRISTLES], p[MOTOR_BRISTLES]
+    if is_rigid(p):
+        motor += e[fx.GRAVITY_TORQUE_NM]
+    else:
+        link += e[fx.GRAVITY_TORQUE_NM]
+    motor += (
         e[fx.COGGING_AMPLITUDE_NM]
         * e[fx.COGGING_CYCLES_PER_TURN]
         * (1.0 + 2.0 * e[fx.COGGING_SECOND_RATIO])
@@ -122,8 +131,6 @@ def _fastest_rate(stiffness, twist, decay, s, p, e):
     )
     friction = e[fx.POSITION_FRICTION_AMPLITUDE_NM] * e[fx.POSITION_FRICTION_CYCLES_PER_TURN]
     motor += friction * (1.0 + 2.0 * e[fx.POSITION_FRICTION_SECOND_RATIO])
-    link += p[LINK_BRISTLES]
-    motor += p[MOTOR_BRISTLES]
     decay += e[fx.TRANSMISSION_DAMPING_NM_S_RAD] * mobility
     decay += e[fx.STRIBECK_FRICTION_LINK_TORQUE_NM] / (
         e[fx.STRIBECK_FRICTION_LINK_VELOCITY_RAD_S] * p[J]

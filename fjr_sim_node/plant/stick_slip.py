@@ -76,7 +76,7 @@ def motor_direction(s, torque, m, w, p, e):
     if s[3] < 0.0:
         return -1.0
     te = transmitted(s, m, w, p, e)
-    drive = motor_torque(s, te, torque, e)
+    drive = motor_torque(s, te, torque, p, e)
     if e is not None and p[MOTOR_BRISTLES] != 0.0:
         return _creep_direction(drive - motor_friction(s, te, m, w, p, e), m[1])
     if not motor_has_coulomb(p, e):
@@ -125,7 +125,7 @@ def _motor_margin(s, torque, m, w, p, e):
     if m[1] != 0.0:
         return s[3] * m[1]
     te = transmitted(s, m, w, p, e)
-    drive = motor_torque(s, te, torque, e)
+    drive = motor_torque(s, te, torque, p, e)
     direction = 1.0 if drive > 0.0 else -1.0
     return motor_level(0.0, direction, s[2], te, p, e) - abs(drive)
 
@@ -250,7 +250,7 @@ def facing(s, m, w, p, e):
 def _breaks_away(which, s, torque, m, w, p, e):
     """Return the direction in which a stuck side starts to slip."""
     te = transmitted(s, m, w, p, e)
-    drive = link_torque(s, te, p, e) if which == 0 else motor_torque(s, te, torque, e)
+    drive = link_torque(s, te, p, e) if which == 0 else motor_torque(s, te, torque, p, e)
     return 1.0 if drive > 0.0 else -1.0
 
 

@@ -17,6 +17,12 @@ JM, J, FS, FSM, FV, FVM, K0, K1, LINK_BRISTLES, MOTOR_BRISTLES = range(10)
 
 
 @inlined
+def is_rigid(p):
+    """Tell whether the link is one that nothing moves, since the axis is rigid."""
+    return p[J] == math.inf
+
+
+@inlined
 def ripple(angle, ratio, phase):
     """Return sin(angle) with a second harmonic of some ratio and phase."""
     value = math.sin(angle)
@@ -260,7 +266,7 @@ def link_drive(q, vq, te, q3, v3, p, e):
 
 
 @inlined
-def motor_drive(th, te, torque, e):
+def motor_drive(th, te, torque, p, e):
     """Return the torque that drives the motor against its friction (N m)."""
     if e is None:
         return torque + te
@@ -271,6 +277,8 @@ def motor_drive(th, te, torque, e):
         drive += e[fx.COGGING_AMPLITUDE_NM] * ripple(
             angle, e[fx.COGGING_SECOND_RATIO], e[fx.COGGING_SECOND_PHASE_RAD]
         )
+    if e[fx.GRAVITY_TORQUE_NM] != 0.0 and is_rigid(p):
+        drive -= e[fx.GRAVITY_TORQUE_NM] * math.sin(th + e[fx.GRAVITY_ANGLE_RAD])
     return drive
 
 

@@ -18,7 +18,7 @@ LINK, MOTOR = 0, 2
 """Where link and motor position (rad) stand in a rig's state."""
 
 _TIME, _HEAD, _RING = 10, 11, 12
-_RING_SIZE = 2048
+_RING_SIZE = 16_384  # samples of the longest delay: 100 ms at 20 kHz, each in eight parts
 
 
 def at_rest(elapsed_s: float = 0.0) -> np.ndarray:
@@ -92,6 +92,9 @@ def hold(x, command, sample_period, p, e):
     x[_HEAD] = head
     x[_RING + head] = torque
     samples = e[fx.DELAY_TIME_S] / sample_period
+    if samples + 1.0 >= _RING_SIZE:
+        x[MOTOR] = math.nan  # older than what is remembered: ends as a motion that diverges
+        return
     whole = int(samples + 1e-9)  # a delay of whole samples is that, whatever its last bit
     before = x[_RING + (head - whole - 1) % _RING_SIZE]
     now = x[_RING + (head - whole) % _RING_SIZE]

@@ -83,7 +83,7 @@ def _closed_loop(
         effects.coefficients(values),
         experiment.elapsed_s,
     )
-    return run if plant.rigid_sums(values) is None else replace(run, link=run.motor)
+    return replace(run, link=run.motor) if plant.moves_as_one(values) else run
 
 
 def run_realization(values: Mapping[str, Any], experiment: Experiment) -> Trajectory:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import math
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from fjr_interface.parameters import ParameterGroup
 from fjr_kit.atomic import result_folder
 from fjr_kit.figure_style import STYLE, save
 from fjr_records.recorded import RecordedExperiment
+from fjr_sim_node import effects, plant
 from fjr_sim_node.simulation.simulator import SIMULATOR
 
 from ..investigation import Investigation
@@ -88,7 +90,7 @@ def updated_values(investigation: Investigation) -> dict[str, dict[str, Any]]:
     recorded, diagnosis = investigation.recorded, investigation.diagnosis
     description = recorded.experiment
     rate = description.sample_rate_hz
-    simulator = {name: float(e.value) for name, e in diagnosis.parameters.items()}
+    simulator = simulator_values({name: float(e.value) for name, e in diagnosis.parameters.items()})
     SIMULATOR.check(simulator, "updated.yaml")
     values: dict[str, dict[str, Any]] = {
         "simulator": {"sample_rate_hz": rate, **simulator},
@@ -97,6 +99,20 @@ def updated_values(investigation: Investigation) -> dict[str, dict[str, Any]]:
     if has_known_law(recorded):
         values["controller"] = from_description(description.controller or {}, rate)
     return values
+
+
+def simulator_values(found: Mapping[str, float]) -> dict[str, float]:
+    """Return the simulator's parameters from those of a diagnosis.
+
+    What the bare plant lacked is in its own parameters then. A rigid axis is one body, whose
+    inertia and friction are the motor's.
+    """
+    light = plant.PLANT["j"].low
+    rigid = {"j": light, "fs": 0.0, "fv": 0.0, "k0": math.inf, "k1": 0.0}
+    own = plant.with_added({**(rigid if "k0" not in found else {}), **found})
+    added = [e for e in effects.CATALOGUE if e.of_bare_plant]
+    gone = {*plant.PLANT.names, *(name for effect in added for name in effect.names)}
+    return {**own, **{name: value for name, value in found.items() if name not in gone}}
 
 
 def has_known_law(recorded: RecordedExperiment) -> bool:

@@ -276,7 +276,7 @@ def _missing_torque(states, rest, p, e):
     for k in range(out.shape[1]):
         th, vth, ath, q, vq, built, flex, u = states[:, k]
         te = transmitted_torque(q, vq, th, vth, flex, p, e)
-        balance = p[0] * ath + motor_viscous(vth, p, e) - motor_drive(th, te, u, e)
+        balance = p[0] * ath + motor_viscous(vth, p, e) - motor_drive(th, te, u, p, e)
         if abs(vth) > rest:
             direction = 1.0 if vth > 0.0 else -1.0
             friction = direction * motor_level(abs(vth), direction, th, te, p, e)

@@ -24,9 +24,6 @@ from ..model.misfit import Misfit
 from ..model.simulated_rig import Model, Simulator
 from .least_squares import Solution
 
-CYCLES = np.concatenate([np.arange(0.5, 4.0, 0.25), np.arange(4.0, 40.0, 0.5), np.arange(40, 231)])
-"""Numbers of ripples per turn that are looked at; between them the response hardly changes."""
-
 
 @dataclass(frozen=True)
 class _Motion:
@@ -56,6 +53,7 @@ class RippleSearch:
         misfit: Misfit,
         model: Model,
         parent: Solution,
+        tried: np.ndarray,
     ) -> None:
         """Simulate the model's motion once.
 
@@ -66,8 +64,11 @@ class RippleSearch:
             misfit: of the realizations that count.
             model: the parent's model.
             parent: where the parent's fit ended.
+            tried: numbers of ripples per turn to look at, float64 (n,), ascending; between them
+                the response hardly changes.
         """
         self._effect, self._misfit, self._plant = effect, misfit, model.plant
+        self._tried = tried
         self._motion = _motion(recorded, simulator, misfit, model)
         self._basis = np.linalg.qr(parent.jacobian)[0]
         self._left = self._beyond(parent.residuals)
@@ -78,8 +79,8 @@ class RippleSearch:
         Args:
             most: how many to return, each a maximum of its own.
         """
-        gains = np.array([self._best_sizes((cycles,))[1] for cycles in CYCLES.tolist()])
-        return [float(CYCLES[i]) for i in _peaks(gains)[:most]]
+        gains = np.array([self._best_sizes((cycles,))[1] for cycles in self._tried.tolist()])
+        return [float(self._tried[i]) for i in _peaks(gains)[:most]]
 
     def harmonics(self, most: int) -> list[tuple[float, float, float, float, float]]:
         """Return the ripples with a second harmonic that promise most, best first.
@@ -88,14 +89,14 @@ class RippleSearch:
             (size, cycles per turn, phase (rad), second harmonic over the first, its phase (rad)),
             at the most `most`.
         """
-        tried = [self._best_sizes((cycles, 2.0 * cycles)) for cycles in CYCLES.tolist()]
+        tried = [self._best_sizes((cycles, 2.0 * cycles)) for cycles in self._tried.tolist()]
         found = []
         for i in _peaks(np.array([gain for _, gain in tried]))[:most]:
             weights = tried[i][0]
             first, second = complex(*weights[:2]), complex(*weights[2:])
             phase, size = cmath.phase(first), max(abs(first), 0.1 * abs(second))
             bend = math.remainder(cmath.phase(second) - 2.0 * phase, 2.0 * math.pi)
-            found.append((size, float(CYCLES[i]), phase, abs(second) / size, bend))
+            found.append((size, float(self._tried[i]), phase, abs(second) / size, bend))
         return found
 
     def _best_sizes(self, cycles: Sequence[float]) -> tuple[np.ndarray, float]:
