@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from controller_node.transfer_function import law_of
+from controller_node.law import law_of
 from excitation_node import multisine
 from fjr_interface.experiment import Experiment
 from fjr_interface.parameters import Parameter, ParameterGroup

@@ -1,17 +1,20 @@
 """Controller identity: is the recorded torque the one that the known controller computes?
 
-u - C(z)(r - y) splits faults of the controller and of the logging from those of the plant: in a
-plant fault, whatever it is, the controller still does what it is said to do.
+u - (C_r(z) r - C_y(z) y) splits faults of the controller and of the logging from those of the
+plant: in a plant fault, whatever it is, the controller still does what it is said to do.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.signal import lfilter
 
-from controller_node.transfer_function import Law, TransferFunction, as_transfer_function, law_of
+from controller_node.law import Law, as_transfer_function, law_of
+from controller_node.transfer_function import TransferFunction
+from fjr_kit.errors import InputError
 from fjr_records.recorded import RecordedRealization
 
 FORGOTTEN = 1e-9
@@ -42,23 +45,52 @@ class ControllerCheck:
         return self.sample is None
 
 
-def check_controller(realization: RecordedRealization) -> ControllerCheck:
-    """Compare the torque of one bag with its control law; raise InputError for an unknown law."""
+def check_controller(
+    realization: RecordedRealization, gains: Mapping[str, float] | None = None
+) -> ControllerCheck:
+    """Compare the torque of one bag with its control law.
+
+    Args:
+        realization: the bag.
+        gains: values of gains that its description leaves unknown.
+
+    Raises:
+        InputError: the law is not known.
+    """
     description = realization.experiment
-    described = law_of(description.controller, description.sample_rate_hz)
-    law = as_transfer_function(described)
-    error = (realization.played - realization.position).ravel()
-    torque = realization.torque.ravel()
-    unlimited = _unlimited(described, error)
-    start = _forgotten(law.slowest_pole, error.size)
+    law = law_of(description.controller, description.sample_rate_hz, gains)
+    signals = realization.played, realization.position, realization.torque
+    return check_law(law, *(signal.ravel() for signal in signals))
+
+
+def check_law(
+    law: Law, reference: np.ndarray, position: np.ndarray, torque: np.ndarray
+) -> ControllerCheck:
+    """Compare a recorded torque with a control law that entered the record in any state.
+
+    Args:
+        law: the law.
+        reference: r, (samples,) in rad.
+        position: y, likewise.
+        torque: u, likewise in N m.
+
+    Raises:
+        InputError: the signals differ in length.
+    """
+    if not reference.shape == position.shape == torque.shape:
+        raise InputError(
+            f"Reference, position and torque have {reference.size}, {position.size} and "
+            f"{torque.size} samples; a control law is checked on records of one length."
+        )
+    linear = as_transfer_function(law)
+    unlimited = _unlimited(law, reference, position)
+    start = _forgotten(linear.slowest_pole, torque.size)
     if start is None:
         start = 0
-        unlimited += _entered(law, torque - unlimited, np.abs(torque) < law.limit_nm)
-    expected = np.clip(unlimited, -law.limit_nm, law.limit_nm)
-    size = max(np.abs(realization.played).max(), np.abs(realization.position).max())
-    impulse = lfilter(law.numerator, law.denominator, np.eye(1, error.size)[0])
-    gain = float(np.abs(impulse).max() + np.abs(np.diff(impulse)).sum())
-    tolerance = float(SINGLE_ROUNDING * (np.abs(torque).max() + gain * size))
+        state = linear.entering_state(reference, position, torque)
+        unlimited += linear.free_responses(torque.size) @ state
+    expected = linear.clamped(unlimited)
+    tolerance = _rounding(linear, reference, position, torque)
     deviation = torque - expected
     deviation[:start] = 0.0
     broken = np.flatnonzero(~(np.abs(deviation) <= tolerance))
@@ -68,14 +100,26 @@ def check_controller(realization: RecordedRealization) -> ControllerCheck:
     return ControllerCheck(float(np.abs(deviation).max()), tolerance, int(broken[0]), cause)
 
 
-def _unlimited(law: Law, error: np.ndarray) -> np.ndarray:
+def _rounding(
+    law: TransferFunction, reference: np.ndarray, position: np.ndarray, torque: np.ndarray
+) -> float:
+    """Return what rounding of the stored signals may change of the torque (N m)."""
+    size = max(float(np.abs(reference).max()), float(np.abs(position).max()))
+    one = np.eye(1, torque.size)[0]
+    impulses = [lfilter(part, law.denominator, one) for part in (law.reference, law.position)]
+    gain = max(float(np.abs(h).max() + np.abs(np.diff(h)).sum()) for h in impulses)
+    return SINGLE_ROUNDING * (float(np.abs(torque).max()) + gain * size)
+
+
+def _unlimited(law: Law, reference: np.ndarray, position: np.ndarray) -> np.ndarray:
     """Return the torque of a law from zero state without its limit, to the last bit where it can.
 
     The default law is computed in the order of its own step, which no transfer function keeps.
     """
     if isinstance(law, TransferFunction):
-        return lfilter(law.numerator, law.denominator, error)
+        return law.unlimited(reference, position)
     p, dn, decay, _ = law
+    error = reference - position
     return p * error + dn * (error - lfilter([0.0, 1.0 - decay], [1.0, -decay], error))
 
 
@@ -85,23 +129,6 @@ def _forgotten(decay: float, samples: int) -> int | None:
         return 1
     needed = np.inf if decay >= 1.0 else np.log(FORGOTTEN) / np.log(decay)
     return int(needed) if needed < samples // 2 else None
-
-
-def _entered(law: TransferFunction, deviation: np.ndarray, free: np.ndarray) -> np.ndarray:
-    """Return the part of a deviation that an unknown initial state explains, (samples,).
-
-    Args:
-        law: the control law.
-        deviation: u less the law's response from zero state, (samples,) in N m.
-        free: bool (samples,), where the torque is not clamped.
-    """
-    states = np.eye(law.denominator.size - 1)
-    nothing = np.zeros(deviation.size)
-    columns = np.stack(
-        [lfilter(law.numerator, law.denominator, nothing, zi=x)[0] for x in states], axis=1
-    )
-    solution = np.linalg.lstsq(columns[free], deviation[free], rcond=None)[0]
-    return columns @ solution
 
 
 def _cause(

@@ -10,8 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.signal import lfilter
 
-from controller_node import pd_filtered, transfer_function
-from controller_node.controller_file import TWO_DEGREES, describe, read_controller
+from controller_node import pd_filtered
+from controller_node.controller_file import describe, read_controller
+from controller_node.law import law_of
+from controller_node.structures import ONE_DEGREE, TWO_DEGREES
+from controller_node.transfer_function import TransferFunction
 from fjr_kit.errors import InputError
 
 RATE = 500.0
@@ -59,10 +62,10 @@ def test_the_law_of_the_node_is_kept_as_it_is(tmp_path):
     assert law == {"kind": "pd_filtered", "p": 200, "d": 60, "n": 24, "torque_limit_nm": 9.0}
     own = pd_filtered.from_description(law, RATE)
     same = described(tmp_path, "kind: pd\np: 200\nd: 60\nn: 24\ntorque_limit_nm: 9\n")
-    assert same["kind"] == transfer_function.KIND and same["torque_limit_nm"] == 9.0
-    expected = transfer_function.TransferFunction.of_pd(pd_filtered.coefficients(own))
-    found = transfer_function.law_of(same, RATE)
-    np.testing.assert_allclose(found.numerator, expected.numerator)
+    assert same["kind"] == ONE_DEGREE and same["torque_limit_nm"] == 9.0
+    expected = TransferFunction.of_pd(pd_filtered.coefficients(own))
+    found = law_of(same, RATE)
+    np.testing.assert_allclose(found.position, expected.position)
     np.testing.assert_allclose(found.denominator, expected.denominator)
 
 
@@ -87,13 +90,7 @@ def test_unknown_gains_stay_and_are_listed(tmp_path):
     }
     json.dumps(law, allow_nan=False)
     with pytest.raises(InputError, match=r"p is unknown, so the law cannot be simulated"):
-        transfer_function.law_of({"kind": "pid", "p": None, "unknown": ["p"]}, RATE)
-
-
-def test_two_degrees_of_freedom_are_said_not_to_be_simulated(tmp_path):
-    law = described(tmp_path, "kind: pd\np: 1\nd: 1\nderivative_on: measurement\n")
-    with pytest.raises(InputError, match="two degrees of freedom is described but not simulated"):
-        transfer_function.law_of(law, RATE)
+        law_of({"kind": "pid", "p": None, "unknown": ["p"]}, RATE)
 
 
 @pytest.mark.parametrize(
@@ -113,7 +110,7 @@ def test_two_degrees_of_freedom_are_said_not_to_be_simulated(tmp_path):
         ("\x00\xff", "neither YAML nor JSON"),
         (
             "kind: transfer_function\nnumerator: [1]\ndenominator: [1, -2]\n",
-            r"controller\.denominator has a pole of magnitude 2 outside",
+            r"controller has a pole of magnitude 2 outside",
         ),
         ("kind: transfer_function\nnumerator: [1]\ndenominator: [0, 1]\n", "is not causal"),
         (
@@ -121,6 +118,11 @@ def test_two_degrees_of_freedom_are_said_not_to_be_simulated(tmp_path):
             "domain: continuous\n",
             "is not causal",
         ),
+        (
+            "kind: transfer_function\nnumerator: [1]\ndenominator: [1, unknown]\n",
+            r"denominator\.1: must be a number; only coefficients of a numerator may be unknown",
+        ),
+        ("kind: pd\np: 1\nanti_windup: 2\n", "anti_windup: Extra inputs are not permitted"),
     ],
 )
 def test_a_bad_file_is_refused_in_a_sentence(tmp_path, text, says):
