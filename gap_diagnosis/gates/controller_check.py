@@ -6,10 +6,12 @@ plant: in a plant fault, whatever it is, the controller still does what it is sa
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import null_space
 from scipy.signal import lfilter
 
 from controller_node.law import Law, as_transfer_function, law_of
@@ -83,21 +85,45 @@ def check_law(
             f"{torque.size} samples; a control law is checked on records of one length."
         )
     linear = as_transfer_function(law)
-    unlimited = _unlimited(law, reference, position)
-    start = _forgotten(linear.slowest_pole, torque.size)
-    if start is None:
-        start = 0
-        state = linear.entering_state(reference, position, torque)
-        unlimited += linear.free_responses(torque.size) @ state
+    unlimited, known = _computed(law, reference, position, torque)
     expected = linear.clamped(unlimited)
     tolerance = _rounding(linear, reference, position, torque)
-    deviation = torque - expected
-    deviation[:start] = 0.0
+    deviation = np.where(known, torque - expected, 0.0)
     broken = np.flatnonzero(~(np.abs(deviation) <= tolerance))
     if not broken.size:
         return ControllerCheck(float(np.abs(deviation).max()), tolerance, None, "")
-    cause = _cause(torque[start:], expected[start:], unlimited[start:], tolerance)
+    cause = (
+        _clamped(torque[known], unlimited[known], tolerance)
+        or _shifted(law, reference, position, torque, tolerance)
+        or _scaled(torque[known], expected[known], tolerance)
+    )
     return ControllerCheck(float(np.abs(deviation).max()), tolerance, int(broken[0]), cause)
+
+
+def _computed(
+    law: Law, reference: np.ndarray, position: np.ndarray, torque: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the torque of the law before its limit, and where it is known, (samples,) each.
+
+    The state with which the law entered is forgotten after some samples, or estimated.
+    """
+    linear = as_transfer_function(law)
+    unlimited = _unlimited(law, reference, position)
+    start = _forgotten(linear.slowest_pole, torque.size)
+    if start is not None:
+        return unlimited, np.arange(torque.size) >= start
+    free = np.abs(torque) < clamp_nm(torque, linear.limit_nm)
+    responses = linear.free_responses(torque.size)
+    unlimited += responses @ linear.entering_state(reference, position, torque, free)
+    hidden = null_space(np.linalg.qr(responses[free], mode="r"))
+    return unlimited, np.abs(responses @ hidden).max(axis=1, initial=0.0) <= FORGOTTEN
+
+
+def clamp_nm(torque: np.ndarray, limit_nm: float = math.inf) -> float:
+    """Return at which torque a record is clamped (N m): as described, or where it often ends."""
+    peak = float(np.abs(torque).max(initial=0.0))
+    ends = int((np.abs(torque) >= peak * (1.0 - SINGLE_ROUNDING)).sum())
+    return min(limit_nm, peak * (1.0 - SINGLE_ROUNDING) if 2 < ends < torque.size else math.inf)
 
 
 def _rounding(
@@ -131,22 +157,36 @@ def _forgotten(decay: float, samples: int) -> int | None:
     return int(needed) if needed < samples // 2 else None
 
 
-def _cause(
-    torque: np.ndarray, expected: np.ndarray, unlimited: np.ndarray, tolerance: float
-) -> str:
-    """Return what a broken identity looks like."""
+def _clamped(torque: np.ndarray, unlimited: np.ndarray, tolerance: float) -> str:
+    """Return that a limit clamps the torque which is not described; empty if none does."""
     peak = float(np.abs(torque).max())
-    clamped = np.clip(unlimited, -peak, peak)
     at_peak = int((np.abs(torque) >= peak - tolerance).sum())
-    if at_peak > 2 and np.abs(torque - clamped).max() <= tolerance:
-        return (
-            f"the torque is clamped at {peak:.4g} N m in {at_peak} samples, which the description "
-            "doesn't say; set controller.torque_limit_nm"
-        )
+    if at_peak < 3 or np.abs(torque - np.clip(unlimited, -peak, peak)).max() > tolerance:
+        return ""
+    return (
+        f"the torque is clamped at {peak:.4g} N m in {at_peak} samples, which the description "
+        "doesn't say; set controller.torque_limit_nm"
+    )
+
+
+def _shifted(
+    law: Law, reference: np.ndarray, position: np.ndarray, torque: np.ndarray, tolerance: float
+) -> str:
+    """Return that the torque is logged some samples off; empty if it is not."""
+    linear = as_transfer_function(law)
     for shift in (1, 2, 3, -1, -2, -3):
-        if np.abs(np.roll(expected, shift) - torque)[3:-3].max() <= tolerance:
+        before = slice(max(-shift, 0), min(-shift, 0) or None)
+        after = slice(max(shift, 0), min(shift, 0) or None)
+        r, y, u = reference[before], position[before], torque[after]
+        unlimited, known = _computed(law, r, y, u)
+        if np.abs(linear.clamped(unlimited) - u)[known].max(initial=0.0) <= tolerance:
             what = "late" if shift > 0 else "early"
             return f"the torque is logged {abs(shift)} sample(s) {what}; correct its stamps"
+    return ""
+
+
+def _scaled(torque: np.ndarray, expected: np.ndarray, tolerance: float) -> str:
+    """Return what a torque that does not follow its law looks like."""
     gain = float(torque @ expected / (expected @ expected)) if expected.any() else 0.0
     offset = float(np.mean(torque - expected))
     if np.abs(torque - gain * expected).max() <= 10 * tolerance:
