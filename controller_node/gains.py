@@ -86,7 +86,7 @@ def _free(name: str, rate: float, stiffness: float, torque_nm: float) -> FreeGai
         unit, start = starts[name]
         return FreeGain(name, unit, start / _DECADES, start * _DECADES, True, start)
     if name in ("n", "velocity_filter_rad_s"):
-        return FreeGain(name, "rad/s", 1e-3, 10.0 * rate, True, 0.2 * rate)
+        return FreeGain(name, "rad/s", 1e-3, min(10.0 * rate, 1e5), True, 0.2 * rate)
     if name == "integral_time_s":
         return FreeGain(name, "s", 0.1 / rate, 1e3, True, 10.0 / corner)
     if name == "setpoint_weight":
