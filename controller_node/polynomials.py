@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.signal import cont2discrete
+from scipy.signal import cont2discrete, deconvolve
 
 Ratio = tuple[np.ndarray, np.ndarray]
 """Numerator and denominator in powers z^0, z^-1, ..."""
@@ -52,6 +52,8 @@ def together(one: Ratio, other: Ratio) -> tuple[np.ndarray, np.ndarray, np.ndarr
 def _missing(a1: np.ndarray, a2: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the factors that make two denominators equal."""
     one = np.ones(1)
+    if np.array_equal(a1, a2):
+        return one, one
     if (quotient := _divided(a2, a1)) is not None:
         return quotient, one
     if (quotient := _divided(a1, a2)) is not None:
@@ -78,8 +80,7 @@ def _divided(dividend: np.ndarray, divisor: np.ndarray) -> np.ndarray | None:
     """Return the quotient of two polynomials; None if one does not divide the other."""
     if divisor.size > dividend.size:
         return None
-    quotient = np.polydiv(dividend, divisor)[0]
-    left = dividend - np.convolve(quotient, divisor)
+    quotient, left = deconvolve(dividend, divisor)
     return quotient if np.abs(left).max() <= _EXACT * np.abs(dividend).max() else None
 
 
@@ -115,5 +116,7 @@ def discrete(
 
 def added(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     """Return the sum of two polynomials in powers z^0, z^-1, ..."""
-    size = max(one.size, other.size)
-    return np.pad(one, (0, size - one.size)) + np.pad(other, (0, size - other.size))
+    out = np.zeros(max(one.size, other.size))
+    out[: one.size] += one
+    out[: other.size] += other
+    return out

@@ -11,7 +11,8 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -29,9 +30,10 @@ _CURVED = {"n", "velocity_filter_rad_s", "integral_time_s"}
 _TIMES = {"k_position": "k_velocity", "setpoint_weight": "p"}  # a gain, and by which it multiplies
 _TRIALS = 7  # values of each searched gain at which the search may begin
 _MOST_SEARCHED = 2
-_BEGIN = 3
+_BEGIN = 2
 _TIGHT = {"xtol": 1e-14, "ftol": 1e-14, "gtol": 1e-14}
 _STEP = 1e-5
+_SEARCH_SAMPLES = 10_000
 _BLOCKS = 60
 _SINGULAR = 1e-9
 
@@ -106,6 +108,11 @@ class _Record:
     y: np.ndarray
     free: np.ndarray
 
+    def thinned(self) -> _Record:
+        """Return the record with few enough free samples for a search."""
+        every = 1 + self.free.size // _SEARCH_SAMPLES
+        return replace(self, free=self.free & (np.arange(self.free.shape[1]) % every == 0))
+
     def law(self, gains: Mapping[str, float]) -> TransferFunction:
         """Return the law with these gains and any limit."""
         missing = {_LIMIT: math.inf} if _LIMIT in self.controller["unknown"] else {}
@@ -146,45 +153,50 @@ def _solved(record: _Record, gains: Sequence[FreeGain]) -> IdentifiedGains:
         )
     measured = record.u[record.free]
 
-    def model(point: np.ndarray, weights: np.ndarray | None = None) -> tuple[np.ndarray, ...]:
+    def model(
+        point: np.ndarray, weights: np.ndarray | None = None, of: _Record = record
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the modelled torque, its columns and their weights at values of the search."""
-        columns, offset = record.equations(linear, _values(searched, point))
+        columns, offset = of.equations(linear, _values(searched, point))
         if weights is None:
-            weights = _least_squares(columns, measured - offset)
+            weights = _least_squares(columns, of.u[of.free] - offset)
         weights = np.pad(weights, (0, max(columns.shape[1] - weights.size, 0)))
         return columns @ weights[: columns.shape[1]] + offset, columns, weights
 
-    point = _search(lambda at: (model(at)[0] - measured) / np.std(measured), searched, record.rate)
+    def errors(point: np.ndarray, of: _Record = record) -> np.ndarray:
+        return (model(point, of=of)[0] - of.u[of.free]) / np.std(measured)
+
+    point = np.zeros(0)
+    if searched:
+        point = _searched(partial(errors, of=record.thinned()), searched)
+        point = least_squares(errors, point, bounds=_bounds(searched), **_TIGHT).x
     torque, columns, weights = model(point)
     slopes = [(model(point + h, weights)[0] - torque) / h.sum() for h in _STEP * np.eye(point.size)]
-    errors = _standard_errors(np.column_stack([*slopes, columns]), measured - torque)
+    deviations = _standard_errors(np.column_stack([*slopes, columns]), measured - torque)
     # Searched on a logarithm, the error is one of the logarithm.
     values = _values(searched, point)
     units = [values[gain.name] if gain.logarithmic else 1.0 for gain in searched]
-    errors[: len(units)] *= units
+    deviations[: len(units)] *= units
     found = {**values, **dict(zip(linear, weights.tolist(), strict=False))}
     explained = 1.0 - float(np.var(measured - torque) / np.var(measured))
-    return IdentifiedGains(found, dict(zip(found, errors.tolist(), strict=False)), explained)
+    return IdentifiedGains(found, dict(zip(found, deviations.tolist(), strict=False)), explained)
 
 
-def _search(
-    errors: Callable[[np.ndarray], np.ndarray], searched: Sequence[FreeGain], rate: float
+def _searched(
+    errors: Callable[[np.ndarray], np.ndarray], searched: Sequence[FreeGain]
 ) -> np.ndarray:
     """Return the point that fits best, begun at the best points of a grid."""
-    if not searched:
-        return np.zeros(0)
-    low = np.array([_on_scale(gain, gain.low) for gain in searched])
-    high = np.array([_on_scale(gain, gain.high) for gain in searched])
+    low, high = _bounds(searched)
     inner = np.linspace(0.0, 1.0, _TRIALS + 2)[1:-1]
-    grid = [np.array(p) for p in itertools.product(inner, repeat=len(searched))]
-    trials = sorted(
-        (low + p * (high - low) for p in grid), key=lambda p: _sum_of_squares(errors(p))
-    )
-    fits = [
-        least_squares(errors, p, bounds=(low, high), x_scale="jac", **_TIGHT)
-        for p in trials[:_BEGIN]
-    ]
+    grid = [low + np.array(p) * (high - low) for p in itertools.product(inner, repeat=low.size)]
+    trials = sorted(grid, key=lambda point: _sum_of_squares(errors(point)))
+    fits = [least_squares(errors, point, bounds=(low, high)) for point in trials[:_BEGIN]]
     return min(fits, key=lambda fit: fit.cost).x
+
+
+def _bounds(searched: Sequence[FreeGain]) -> tuple[np.ndarray, np.ndarray]:
+    low = np.array([_on_scale(gain, gain.low) for gain in searched])
+    return low, np.array([_on_scale(gain, gain.high) for gain in searched])
 
 
 def _sum_of_squares(errors: np.ndarray) -> float:
