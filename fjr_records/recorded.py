@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
@@ -14,6 +14,7 @@ from fjr_interface.resampling.accuracy import Resampling
 from fjr_kit.errors import InputError
 
 from .experiment_folder import ExperimentBag, Override, open_experiment
+from .records import reference_optional
 from .spectra import line_spectrum
 
 
@@ -138,7 +139,7 @@ def read_experiment(
         InputError: see `open_experiment`; or a bag that is damaged further on, or too short.
     """
     opened = open_experiment(
-        folder, _reference_optional(signal_map), override=override, resampling=resampling
+        folder, reference_optional(signal_map), override=override, resampling=resampling
     )
     realizations = tuple(_cut(bag) for bag in opened.bags)
     return RecordedExperiment(opened.source, realizations, opened.notes)
@@ -160,8 +161,3 @@ def _cut(bag: ExperimentBag) -> RecordedRealization:
     assert torque is not None and position is not None  # no bag is read without them
     return RecordedRealization(bag.name, bag.experiment, reference, torque, position, link)
 
-
-def _reference_optional(signal_map: SignalMap) -> SignalMap:
-    if signal_map.reference is None:
-        return signal_map
-    return replace(signal_map, reference=replace(signal_map.reference, required=False))
