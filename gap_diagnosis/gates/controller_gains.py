@@ -33,6 +33,7 @@ _MOST_SEARCHED = 2
 _BEGIN = 2
 _TIGHT = {"xtol": 1e-14, "ftol": 1e-14, "gtol": 1e-14}
 _STEP = 1e-5
+_BEYOND = 3.0
 _SEARCH_SAMPLES = 10_000
 _BLOCKS = 60
 _SINGULAR = 1e-9
@@ -47,7 +48,7 @@ class IdentifiedGains:
         standard_errors: of each, from the scatter of blocks, so that a residual that is not white
             counts; infinite where the record does not show the gain, zero for a torque limit.
         explained: fraction of the torque's variance that the law then explains, where it is not
-            clamped; 1 is all.
+            clamped; 1 is all, 0 and below nothing.
     """
 
     values: dict[str, float]
@@ -89,10 +90,10 @@ def identify_gains(
     solved = _solved(record, gains)
     if all(gain.name != _LIMIT for gain in gains):
         return solved
-    limit = IdentifiedGains({_LIMIT: clamp}, {_LIMIT: 0.0}, solved.explained)
+    limit = clamp if record.reaches(clamp, solved) else math.inf
     return IdentifiedGains(
-        {**solved.values, **limit.values},
-        {**solved.standard_errors, **limit.standard_errors},
+        {**solved.values, _LIMIT: limit},
+        {**solved.standard_errors, _LIMIT: 0.0},
         solved.explained,
     )
 
@@ -122,6 +123,20 @@ class _Record:
         """Return the torque of a law from zero state where the record's is free, (F,)."""
         runs = [law.unlimited(r, y) for r, y in zip(self.r, self.y, strict=True)]
         return np.stack(runs)[self.free]
+
+    def reaches(self, clamp: float, solved: IdentifiedGains) -> bool:
+        """Tell whether the law goes beyond a torque at which the record often ends.
+
+        A torque in coarse counts ends there, too, without being clamped.
+        """
+        law = self.law(solved.values)
+        beyond = []
+        for r, u, y, free in zip(self.r, self.u, self.y, self.free, strict=True):
+            state = law.entering_state(r, y, u, free)
+            beyond.append(np.abs(law.unlimited(r, y, state))[~free] - clamp)
+        scatter = math.sqrt(max(1.0 - solved.explained, 0.0)) * float(np.std(self.u[self.free]))
+        ends = np.concatenate(beyond)
+        return bool(ends.size) and float(np.median(ends)) > _BEYOND * scatter
 
     def equations(
         self, linear: Sequence[str], searched: Mapping[str, float]

@@ -12,7 +12,7 @@ from scipy.signal import lfilter
 
 from controller_node import pd_filtered
 from controller_node.controller_file import describe, read_controller
-from controller_node.law import law_of
+from controller_node.law import as_transfer_function, law_of
 from controller_node.structures import ONE_DEGREE, TWO_DEGREES
 from controller_node.transfer_function import TransferFunction
 from fjr_kit.errors import InputError
@@ -137,17 +137,39 @@ def test_a_file_that_is_not_there(tmp_path):
         read_controller(tmp_path / "none.yaml")
 
 
-@settings(max_examples=150)
-@given(st.text(max_size=200) | st.dictionaries(
+CONTENTS = st.dictionaries(
     st.sampled_from(["kind", "p", "i", "d", "n", "numerator", "denominator", "domain", "k_position",
-                     "k_velocity", "integral_time_s", "torque_limit_nm", "feed_forward"]),
-    st.sampled_from(["pd", "pid", "p_pi", "transfer_function", "unknown", "continuous", 0, 1e300,
-                     -1, [1, -0.5], [], [0], {}, {"velocity": 1e308}, None]),
-).map(json.dumps))  # fmt: skip
+                     "k_velocity", "integral_time_s", "torque_limit_nm", "feed_forward",
+                     "reference", "position"]),
+    st.sampled_from(["pd", "pid", "p_pi", "transfer_function", "two_degrees_of_freedom", "unknown",
+                     "pd_filtered", "continuous", 0, 1e300, -1, 2.5, [1, -0.5], [], [0], {}, None,
+                     {"velocity": 1e308}, {"numerator": [1, 2], "denominator": [1, -1]},
+                     {"numerator": [1e300], "denominator": [1e-300, 1e300]}]),
+)  # fmt: skip
+
+
+@settings(max_examples=200)
+@given(st.text(max_size=200) | CONTENTS.map(json.dumps))
 def test_whatever_the_file_holds_it_is_described_or_refused(tmp_path_factory, text):
     file = tmp_path_factory.getbasetemp() / "fuzzed.yaml"
     file.write_text(text, encoding="utf-8", errors="replace")
     try:
-        json.dumps(describe(read_controller(file), RATE, str(file)), allow_nan=False)
+        entry = describe(read_controller(file), RATE, str(file))
+        json.dumps(entry, allow_nan=False)
+        if "unknown" not in entry:
+            law_of(entry, RATE)
     except InputError as refused:
         assert "\n" not in str(refused)
+
+
+@settings(max_examples=300)
+@given(CONTENTS, st.sampled_from([None, "p", ["p"], ["p", "p"], ["numerator.0"], [3], ["q.1"]]))
+def test_whatever_a_bag_describes_it_is_a_law_or_refused(content, unknown):
+    content = content if unknown is None else {**content, "unknown": unknown}
+    for gains in (None, {"p": 3.0}, {"numerator.0": 2.0}):
+        try:
+            as_transfer_function(law_of(content, RATE, gains))
+        except InputError as refused:
+            sentence = str(refused)
+            assert sentence.startswith("experiment description: controller")
+            assert sentence.endswith(".") and "\n" not in sentence

@@ -92,6 +92,16 @@ def test_a_limit_is_where_the_torque_ends():
     law_of(description, RATE, found.values)
 
 
+def test_coarse_counts_are_no_limit():
+    description, _ = freed({**NODE, "torque_limit_nm": 6.0}, "p", "torque_limit_nm")
+    r, u, y = record(NODE)
+    u = np.round(u / 0.5) * 0.5
+    assert np.sum(np.abs(u) == np.abs(u).max()) > 2
+    found = identify_gains(description, r, u, y, RATE)
+    assert found.values["torque_limit_nm"] == math.inf
+    assert found.values["p"] == pytest.approx(200.0, rel=0.02)
+
+
 def test_standard_errors_cover_the_truth_whatever_the_colour_of_the_noise():
     description, values = freed(PID, "p", "i", "d")
     r, u, y = record(PID)
