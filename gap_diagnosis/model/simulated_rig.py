@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from controller_node.transfer_function import law_of
+from controller_node.law import law_of
 from fjr_kit.errors import InputError
 from fjr_records.noise import NoiseLevels, noise_levels
 from fjr_records.recorded import RecordedExperiment, RecordedRealization

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controller_node.transfer_function import law_of
+from controller_node.law import law_of
 from fjr_kit.errors import InputError
 from fjr_records.recorded import RecordedExperiment
 from fjr_records.spectra import line_spectrum

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controller_node.transfer_function import as_transfer_function, law_of
+from controller_node.law import as_transfer_function, law_of
 from fjr_records.recorded import RecordedExperiment
 from fjr_records.spectra import line_spectrum
 from fjr_sim_node import effects as fx
@@ -125,13 +125,12 @@ def _motion(
     y, _, q = simulator.motion(model, misfit.which)
     lines = np.arange(recorded.lines)
     excited = np.array(description.excited_harmonics)
-    z = np.exp(2j * np.pi * lines / description.samples_per_period)
-    law = as_transfer_function(law_of(description.controller, description.sample_rate_hz))
-    powers = z[:, None] ** -np.arange(law.numerator.size)
-    controller = (powers @ law.numerator) / (powers @ law.denominator)
+    rate = description.sample_rate_hz
+    law = as_transfer_function(law_of(description.controller, rate))
+    forward, _ = law.response(lines * description.base_frequency_hz, rate)
     r = [recorded.realizations[i].played[-1] for i in misfit.which]
     loop = line_spectrum(y, lines.size) / (line_spectrum(np.array(r), lines.size) + 1e-300)
-    response = np.array([_between(lines, excited, row[excited]) for row in loop]) / controller
+    response = np.array([_between(lines, excited, row[excited]) for row in loop]) / forward
     p, s = model.plant, 2j * np.pi * lines * description.base_frequency_hz
     twist = q - y
     return _Motion(
