@@ -15,8 +15,8 @@ from .model.evidence import Evidence
 from .model.simulated_rig import Model
 from .outcome.diagnosis import Diagnosis
 from .record_judgement import Tested, judge_records, tested_causes
-from .which.cell_fits import CellFitter, catalogue
-from .which.search_space import TOLERANCE
+from .which.cell_fits import CellFitter
+from .which.search_space import TOLERANCE, catalogue
 from .which.stepwise import Found, Stepwise, gain, stands_for
 
 Progress = Callable[[str], None]
@@ -78,7 +78,7 @@ def investigate_records(
     progress("windows and noise")
     evidence = Evidence(records)
     fitter = CellFitter(evidence, model.plant, tolerance)
-    names = catalogue(model.plant, effects)
+    names = [e for e in catalogue(model.plant) if effects is None or e in effects]
     found = Stepwise(fitter, names, progress, begun + budget_s).run()
     found, tested = _kept(fitter, found, progress)
     progress("what may stand in for a cause")
@@ -154,13 +154,13 @@ def _alternatives(
 
 
 def _notes(evidence: Evidence, found: Found) -> list[str]:
-    notes = []
+    notes = list(evidence.simulator.loop.notes)
     if not evidence.noise.known:
         notes.append(
             "The noise of the position is not known: no repeats, no standstill, and the highest "
             "lines are not flat; so nothing is said of significance."
         )
-    if evidence.simulator.loop == "unknown":
+    if evidence.simulator.loop.kind == "unknown":
         notes.append(
             "The loop is not known, so the recorded torque drives the model and an observer of "
             f"{evidence.simulator.crossover_hz:.3g} Hz holds it to the recorded position: below "

@@ -252,7 +252,7 @@ def judge_records(
         evidence=EvidenceKind(
             noise=evidence.noise.source,
             reported_on=_reported_on(evidence),
-            controller="known" if evidence.simulator.loop == "known" else "unknown",
+            controller=evidence.simulator.loop.kind,
             excitation="record",
         ),
         causes=causes,

@@ -20,12 +20,15 @@ from ..model.evidence import Evidence
 from ..model.simulated_rig import Model
 from .least_squares import Solution, solve
 from .screening import Proposal, Screening
+from .ripples_of_records import RecordRipples
+from .scales import Scales
 from .search_space import Space, space_for, starts
 
 _REFIT_ROUNDS = (8, 5, 5)
 _ADDED_ROUNDS = (6, 4)
 _NO_PROMISE = 0.998  # of the parent's cost: a start that gains less is not pursued
 _STARTS = 2
+RIPPLES_TRIED = 3
 _RIVAL = 1.05  # a second start that costs more than this times the first is not pursued
 
 
@@ -66,6 +69,7 @@ class CellFitter:
         self.evidence, self.nominal, self.tolerance = evidence, dict(nominal), tolerance
         self.fit_parts = evidence.parts_for("fit")
         self.select_parts = evidence.parts_for("select") or self.fit_parts
+        self._rippled: tuple[CellFit, RecordRipples] | None = None
         self._cell = evidence.cell_of(self.fit_parts)
         self._floor = evidence.floor(self.fit_parts)
         self.groups = evidence.part_of(self.fit_parts)
@@ -78,21 +82,31 @@ class CellFitter:
         self._counts = np.bincount(self._select_bins, minlength=shape[0] * shape[1]).reshape(shape)
         levels = [evidence.records.levels.index(evidence.parts[p].level) for p in self.select_parts]
         self._select_floor = self._floor.reshape(-1, evidence.bands)[levels]
-        self._peak = max(float(np.abs(r.torque).max()) for r in evidence.records.records)
+        records = evidence.records
+        self.scales = Scales.of_record(
+            [r.position for r in records.records],
+            [r.torque for r in records.records],
+            records.sample_rate_hz,
+            evidence.lines * evidence.line_hz,
+            self.nominal,
+        )
 
     def refit(self) -> CellFit:
         """Fit the base parameters alone, from the datasheet."""
-        space = Space(self.nominal, (), (), self.tolerance)
+        space = Space(self.nominal, (), (), self.tolerance, self.scales)
         start = space.point(Model(self.nominal, {}))
         errors = self.evidence.errors([space.model(start)], self.fit_parts)[0]
         return self._reweighted((), space, start, self._variance(errors), _REFIT_ROUNDS)
 
     def screening(self, parent: CellFit, effect: str) -> Screening:
         """Return what the starts of an effect promise beside a fit."""
+        cycles = None
+        if fx.EFFECTS[effect].ripple:
+            cycles = self._ripples(parent).cycles(effect, self.scales.cycles(), RIPPLES_TRIED)
         return Screening(
             parent.solution,
             parent.model,
-            starts(effect, self._peak),
+            starts(effect, self.scales, cycles, self.nominal),
             partial(self._space, parent),
             partial(self._residuals, parent.variance),
         )
@@ -148,8 +162,16 @@ class CellFitter:
         mean = squares.reshape(len(parts), -1) / self._counts
         return mean + self._select_floor
 
+    def _ripples(self, parent: CellFit) -> RecordRipples:
+        if self._rippled is None or self._rippled[0] is not parent:
+            weight = 1.0 / np.sqrt(parent.variance[self._cell])
+            solution = parent.solution
+            ripples = RecordRipples(self.evidence, self.fit_parts, parent.model, weight, solution)
+            self._rippled = parent, ripples
+        return self._rippled[1]
+
     def _space(self, parent: CellFit, seed: Mapping[str, float]) -> Space:
-        added = space_for(self.nominal, seed)
+        added = space_for(self.nominal, seed, self.scales, self.tolerance)
         return replace(
             parent.space,
             effects=parent.space.effects + added.effects,
@@ -192,15 +214,3 @@ class CellFitter:
         )
         model = space.model(x)
         return CellFit(effects, space, model, ended, variance, self._left(model))
-
-
-def catalogue(nominal: Mapping[str, float], asked: Sequence[str] | None = None) -> list[str]:
-    """Return the effects that a rig can have, or those of them that were asked for."""
-    rigid = "k0" not in nominal
-    return [
-        effect.identifier
-        for effect in fx.CATALOGUE
-        if effect.starts
-        and (effect.on_rigid_axis or not rigid)
-        and (asked is None or effect.identifier in asked)
-    ]

@@ -30,6 +30,7 @@ TIED_SHARE = 0.15
 TIED_P = 0.1
 """...or by less than half of it and unseen parts do not show the difference."""
 
+_MUCH_LESS = 0.3  # of the greatest gain: a cause that gains less waits for the next step
 _NEUTRAL = 0.02  # of the greatest gain of a part: parts that change by less say nothing
 
 Progress = Callable[[str], None]
@@ -125,10 +126,11 @@ class Stepwise:
                 break
             fits = self._extended(found.best)
             found.rivals[len(found.best.effects) + 1] = fits
-            if not fits or not self._gain(fits[0], found.best).present:
+            chosen = self._chosen(fits, found.best)
+            if chosen is None:
                 break
-            found.alternatives[fits[0].effects[-1]] = self._tied(fits, found.best)
-            found.steps.append(fits[0])
+            found.alternatives[chosen.effects[-1]] = self._tied(chosen, fits, found.best)
+            found.steps.append(chosen)
         return found
 
     @property
@@ -161,11 +163,19 @@ class Stepwise:
     def _gain(self, after: CellFit, before: CellFit) -> Gain:
         return gain(self._fitter, after, before)
 
-    def _tied(self, fits: Sequence[CellFit], parent: CellFit) -> list[str]:
-        """Return the effects that unseen parts cannot tell from the first one."""
-        first = self._gain(fits[0], parent).mean
-        others = fits[1:]
-        return [f.effects[-1] for f in others if stands_for(self._gain(fits[0], f), first)]
+    def _chosen(self, fits: Sequence[CellFit], parent: CellFit) -> CellFit | None:
+        """Return the best fit whose gain repeats, unless another one gains much more."""
+        gains = [self._gain(fit, parent) for fit in fits]
+        for fit, found in zip(fits, gains, strict=True):
+            if found.present and found.mean > _MUCH_LESS * gains[0].mean:
+                return fit
+        return None
+
+    def _tied(self, chosen: CellFit, fits: Sequence[CellFit], parent: CellFit) -> list[str]:
+        """Return the effects that unseen parts cannot tell from the chosen one."""
+        first = self._gain(chosen, parent).mean
+        others = [fit for fit in fits if fit is not chosen]
+        return [f.effects[-1] for f in others if stands_for(self._gain(chosen, f), first)]
 
 
 def stands_for(behind: Gain, first: float) -> bool:
