@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -93,10 +93,10 @@ def explained(law: TransferFunction, record: Record) -> float:
 
 def _solved(runs: Sequence[Record], rate: float) -> dict[str, float]:
     samples = min(r.samples for r in runs)
-    signals: list[Any] = [
-        np.array([getattr(r, name)[:samples] for r in runs])
-        for name in ("reference", "torque", "position")
-    ]
+    reference = np.array([r.reference[:samples] for r in runs if r.reference is not None])
+    torque, position = (
+        np.array([getattr(r, name)[:samples] for r in runs]) for name in ("torque", "position")
+    )
     controller = runs[0].controller
     assert controller is not None
-    return dict(identify_gains(controller, *signals, rate).values)
+    return dict(identify_gains(controller, reference, torque, position, rate).values)

@@ -19,9 +19,9 @@ from fjr_sim_node import effects as fx
 from ..model.evidence import Evidence
 from ..model.simulated_rig import Model
 from .least_squares import Solution, solve
-from .screening import Proposal, Screening
 from .ripples_of_records import RecordRipples
 from .scales import Scales
+from .screening import Proposal, Screening
 from .search_space import Space, space_for, starts
 
 _REFIT_ROUNDS = (8, 5, 5)

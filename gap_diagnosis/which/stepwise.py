@@ -164,12 +164,22 @@ class Stepwise:
         return gain(self._fitter, after, before)
 
     def _chosen(self, fits: Sequence[CellFit], parent: CellFit) -> CellFit | None:
-        """Return the best fit whose gain repeats, unless another one gains much more."""
+        """Return the best fit whose gain repeats, unless another one gains much more.
+
+        Of those that unseen parts cannot tell from it, the one with the fewest parameters.
+        """
         gains = [self._gain(fit, parent) for fit in fits]
-        for fit, found in zip(fits, gains, strict=True):
-            if found.present and found.mean > _MUCH_LESS * gains[0].mean:
-                return fit
-        return None
+        repeating = [
+            fit
+            for fit, found in zip(fits, gains, strict=True)
+            if found.present and found.mean > _MUCH_LESS * gains[0].mean
+        ]
+        if not repeating:
+            return None
+        first = repeating[0]
+        worth = self._gain(first, parent).mean
+        alike = [f for f in repeating if f is first or stands_for(self._gain(first, f), worth)]
+        return min(alike, key=lambda fit: len(fit.space.effects))
 
     def _tied(self, chosen: CellFit, fits: Sequence[CellFit], parent: CellFit) -> list[str]:
         """Return the effects that unseen parts cannot tell from the chosen one."""
