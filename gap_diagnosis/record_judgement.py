@@ -29,6 +29,7 @@ from .where.remainder import looks_like
 from .which.cell_fits import CellFit, CellFitter
 from .which.presence import (
     LEAST_INVARIANCE_P,
+    at_its_bound,
     beyond_zero,
     cell_estimates,
     invariance,
@@ -60,7 +61,7 @@ class Tested:
         gain: what leaving it out loses on unseen parts.
         without: the fit that lacks it.
         invariance_p: see `invariance`; None with one level.
-        certain: whether the interval of its size lacks zero.
+        certain: whether the interval of its size lacks zero, and no parameter is at its bound.
     """
 
     effect: str
@@ -98,7 +99,7 @@ def tested_causes(fitter: CellFitter, fit: CellFit, groups: np.ndarray) -> list[
                 gain(fitter, fit, without),
                 without,
                 invariance(fitter, fit, effect),
-                beyond_zero(effect, estimates),
+                beyond_zero(effect, estimates) and not at_its_bound(fit, effect),
             )
         )
     return found
