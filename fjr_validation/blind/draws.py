@@ -186,6 +186,28 @@ def _drift(rng: np.random.Generator) -> Draw:
                 {"drift_time_s": _log(rng, 15.0, 60.0)})  # fmt: skip
 
 
+def _slew(rng: np.random.Generator) -> Draw:
+    return Draw("torque_slew_limit", {}, 0.5, 4.0, slows="slew_nm_s",
+                same_as={"slew_nm_s": "torque_slew_limit.limit_nm_s"})  # fmt: skip
+
+
+def _deadband(rng: np.random.Generator) -> Draw:
+    return Draw("dead_band", {"deadband_nm": 1.0}, 0.3, 6.0,
+                same_as={"deadband_nm": "dead_band.width_nm"})  # fmt: skip
+
+
+def _asymmetric_stiffness(rng: np.random.Generator) -> Draw:
+    return Draw("asymmetric_stiffness", {"stiffness_asymmetry": _sign(rng)}, 0.03, 0.5,
+                same_as={"stiffness_asymmetry": "asymmetric_stiffness.relative"})  # fmt: skip
+
+
+def _ripple(rng: np.random.Generator) -> Draw:
+    same = {"ripple_relative": "amplitude", "ripple_cycles": "cycles_per_turn"}
+    return Draw("torque_constant_ripple", {"ripple_relative": 1.0}, 0.05, 0.6,
+                {"ripple_cycles": _log(rng, 10.0, 150.0)},
+                same_as={k: f"torque_constant_ripple.{v}" for k, v in same.items()})  # fmt: skip
+
+
 SINGLE: tuple[Drawer, ...] = (
     _stribeck("motor", "motor"),
     _stribeck("link", "link"),
@@ -206,11 +228,15 @@ SINGLE: tuple[Drawer, ...] = (
     _delay,
     _lag,
     _saturation,
+    _slew,
+    _deadband,
+    _asymmetric_stiffness,
+    _ripple,
     _gain,
     _quantization,
     _eccentricity,
 )
-"""Draws of every effect of the catalogue but drift, in the catalogue's order."""
+"""Draws of the effects of the catalogue but drift that the second plant has a law for."""
 
 NONSTATIONARY: Drawer = _drift
 
@@ -235,21 +261,9 @@ def _memory(rng: np.random.Generator) -> Draw:
                 {"memory_time_s": _log(rng, 0.02, 0.2)})  # fmt: skip
 
 
-def _slew(rng: np.random.Generator) -> Draw:
-    return Draw("rate_limited_drive", {}, 0.5, 4.0, slows="slew_nm_s")
-
-
 def _angle_stiffness(rng: np.random.Generator) -> Draw:
     return Draw("angle_dependent_stiffness", {"angle_stiffness_relative": 1.0}, 0.05, 0.6,
                 {"angle_stiffness_cycles": _log(rng, 5.0, 60.0)})  # fmt: skip
-
-
-def _deadband(rng: np.random.Generator) -> Draw:
-    return Draw("drive_dead_band", {"deadband_nm": 1.0}, 0.3, 6.0)
-
-
-def _asymmetric_stiffness(rng: np.random.Generator) -> Draw:
-    return Draw("asymmetric_stiffness", {"stiffness_asymmetry": _sign(rng)}, 0.03, 0.5)
 
 
 def _inertia(rng: np.random.Generator) -> Draw:
@@ -257,20 +271,11 @@ def _inertia(rng: np.random.Generator) -> Draw:
                 {"inertia_cycles": _log(rng, 2.0, 12.0)})  # fmt: skip
 
 
-def _ripple(rng: np.random.Generator) -> Draw:
-    return Draw("torque_constant_ripple", {"ripple_relative": 1.0}, 0.05, 0.6,
-                {"ripple_cycles": _log(rng, 10.0, 150.0)})  # fmt: skip
-
-
 OUTSIDE: tuple[Drawer, ...] = (
     _absorber,
     _hum,
     _memory,
-    _slew,
     _angle_stiffness,
-    _deadband,
-    _asymmetric_stiffness,
     _inertia,
-    _ripple,
 )
 """Draws of effects that the catalogue does not hold."""

@@ -43,7 +43,8 @@ SETTINGS: tuple[str, ...] = (
     "angle_stiffness_cycles", "deadband_nm", "stiffness_asymmetry",
     "inertia_variation", "inertia_cycles", "ripple_relative", "ripple_cycles",
 )  # fmt: skip
-"""Settings, zero if off; from absorber_kg_m2 on they are outside any catalogue."""
+"""Settings, zero if off; from absorber_kg_m2 on all but slew_nm_s, deadband_nm, stiffness_asymmetry
+and ripple are outside the catalogue."""
 
 (
     STRIBECK_M, STRIBECK_MV, STRIBECK_L, STRIBECK_LV, ASYM_C, ASYM_V, BIAS, GMS_M, GMS_L, LOAD,
