@@ -29,6 +29,13 @@ MODERATE = {
     "torque_bias": {"torque_nm": 1.0},
     "presliding_friction": {"motor_rad": 1e-3, "link_rad": 5e-4},
     "load_friction": {"coefficient": 0.1},
+    "lugre_friction": {
+        "stribeck_nm": 2.0,
+        "bristle_nm_rad": 6e3,
+        "velocity_rad_s": 0.05,
+        "damping_nm_s_rad": 5.0,
+    },
+    "directional_loss": {"forward": 0.1, "backward": 0.03},
     "position_friction": {
         "amplitude_nm": 2.0,
         "cycles_per_turn": 50.0,
@@ -39,6 +46,7 @@ MODERATE = {
     "quadratic_friction": {"motor_nm_s2_rad2": 2.0, "link_nm_s2_rad2": 2.0},
     "backlash": {"half_gap_rad": 1e-3},
     "piecewise_stiffness": {"zone_rad": 2e-3, "soft_ratio": 0.4},
+    "asymmetric_stiffness": {"relative": 0.2},
     "hysteresis": {"torque_nm": 3.0, "displacement_rad": 1e-3},
     "transmission_damping": {"nm_s_rad": 2.0},
     "kinematic_error": {
@@ -53,7 +61,8 @@ MODERATE = {
     "transmission_stiffness": {
         "compliance_rad_nm": 1e-3,
         "link_inertia_share": 0.6,
-        "link_friction_share": 0.4,
+        "link_coulomb_share": 0.4,
+        "link_viscous_share": 0.6,
     },
     "cogging": {
         "amplitude_nm": 1.0,
@@ -65,6 +74,16 @@ MODERATE = {
     "delay": {"time_s": 5e-4},
     "actuator_lag": {"time_constant_s": 1e-3},
     "torque_saturation": {"limit_nm": 30.0},
+    "torque_speed_limit": {"stall_nm": 40.0, "no_load_rad_s": 4.0},
+    "torque_slew_limit": {"limit_nm_s": 5e3},
+    "dead_band": {"width_nm": 0.5},
+    "torque_constant_ripple": {
+        "amplitude": 0.1,
+        "cycles_per_turn": 24.0,
+        "phase_rad": 0.3,
+        "second_ratio": 0.4,
+        "second_phase_rad": 0.9,
+    },
     "torque_gain": {"relative_error": 0.05},
     "encoder_quantization": {"resolution_rad": 1e-5},
     "encoder_eccentricity": {"amplitude_rad": 1e-3, "phase_rad": 0.3},
@@ -166,16 +185,36 @@ class Rig:
             + get("stribeck_friction_motor.torque_nm")
             + get("position_friction.amplitude_nm") * second
             + abs(get("asymmetric_friction.coulomb_nm"))
+            + get("lugre_friction.stribeck_nm")
         )
+        lugre = get("lugre_friction.bristle_nm_rad")
+        if lugre != math.inf:
+            highest_motor, distance = lugre, 1.0
+        else:
+            distance = get("presliding_friction.motor_rad")
         sides = (
             (link, highest_link, get("presliding_friction.link_rad")),
-            (motor, highest_motor, get("presliding_friction.motor_rad")),
+            (motor, highest_motor, distance),
         )
         return sum(
             0.5 * torque**2 * distance / highest
             for torque, highest, distance in sides
             if distance and highest
         )
+
+    def work(self, torque: float) -> float:
+        """Return the work that a held command has done at the present motor angle (J)."""
+        get = {**dict(zip(effects.NAMES, effects.DEFAULTS, strict=True)), **self.effects}.get
+        given = math.copysign(max(abs(torque) - get("dead_band.width_nm"), 0.0), torque)
+        given *= 1.0 + get("torque_gain.relative_error")
+        th, cycles = self.x[2], get("torque_constant_ripple.cycles_per_turn")
+        angle = cycles * th + get("torque_constant_ripple.phase_rad")
+        second = get("torque_constant_ripple.second_ratio") / 2.0
+        turned = -math.cos(angle) - second * math.cos(
+            2.0 * angle + get("torque_constant_ripple.second_phase_rad")
+        )
+        ripple = get("torque_constant_ripple.amplitude") * turned / cycles
+        return given * (th + ripple) + get("torque_bias.torque_nm") * th
 
 
 def twist(q, th, get) -> float:
@@ -189,8 +228,11 @@ def twist(q, th, get) -> float:
 def spring_energy(d, v, get) -> float:
     """Return the energy of the transmission's spring behind gap and soft zone (J)."""
 
+    side = 1.0 if d > 0.0 else -1.0
+    stiffness = v["k0"] * (1.0 + side * get("asymmetric_stiffness.relative"))
+
     def held(reduced):
-        return 0.5 * v["k0"] * reduced**2 + 0.25 * v["k1"] * reduced**4
+        return 0.5 * stiffness * reduced**2 + 0.25 * v["k1"] * reduced**4
 
     d = max(abs(d) - get("backlash.half_gap_rad"), 0.0)
     zone, ratio = get("piecewise_stiffness.zone_rad"), get("piecewise_stiffness.soft_ratio")

@@ -13,7 +13,7 @@ Parameter names in files and in ROS are `effect.parameter`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 from .drive import DRIVE, ENCODER
@@ -30,6 +30,7 @@ __all__ = [
     "Effect",
     "EffectParameter",
     "coefficients",
+    "contains",
     "near_equivalents",
     "parameter",
 ]
@@ -76,6 +77,12 @@ def near_equivalents(identifier: str) -> frozenset[str]:
     return frozenset(e.identifier for e in CATALOGUE if family and e.looks_like == family) - {
         identifier
     }
+
+
+def contains(richer: Collection[str], simpler: Collection[str]) -> bool:
+    """Tell whether effects are others but for one, which holds the other's as a limit case."""
+    more, less = set(richer) - set(simpler), set(simpler) - set(richer)
+    return len(more) == len(less) == 1 and less <= set(EFFECTS[min(more)].contains)
 
 
 def coefficients(values: Mapping[str, Any]) -> tuple[float, ...] | None:

@@ -79,6 +79,7 @@ class Effect:
         same_as: what it equals exactly, in words; empty if nothing.
         ripple: whether it is periodic in the motor angle, so that `cycles_per_turn` is searched.
         scales: whether it scales the parameters of the bare plant, wholly or about one angle.
+        contains: effects that it holds as limit cases, which explain what they can with less.
         of_bare_plant: whether it is the bare plant with other values, so that its kernel is the
             bare one.
         axis: which axes can have it; empty: flexible ones if it acts on transmission or link, else
@@ -97,6 +98,7 @@ class Effect:
     same_as: str = ""
     ripple: bool = False
     scales: bool = False
+    contains: tuple[str, ...] = ()
     of_bare_plant: bool = False
     axis: Literal["", "both", "rigid"] = ""
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from .entry import Effect, EffectParameter, Start, ripple, ripple_starts, size
 
 _STRIBECK_STARTS = ({"torque_nm": (0.002, 0.015), "velocity_rad_s": (0.0025, 0.0125, 0.06, 0.3)},)
@@ -104,7 +106,7 @@ FRICTION: tuple[Effect, ...] = (
         "presliding_friction",
         "Friction builds up over a small displacement before sliding, as a stiff spring does.",
         "motor",
-        "plant.torques:build_up",
+        "plant.presliding:bristle_torque",
         "low amplitude, phase lead at the resonance",
         "Dahl 1968, TOR-158(3107-18); de Wit et al. 1995, IEEE TAC 40(3), without bristle damping",
         (
@@ -117,6 +119,28 @@ FRICTION: tuple[Effect, ...] = (
         ({"motor_rad": _SHORT, "link_rad": _SHORT},),
     ),
     Effect(
+        "lugre_friction",
+        "Motor friction is that of bristles which bend, slip and hold less while they move.",
+        "motor",
+        "plant.motion:motor_friction",
+        "low amplitude, a spring before sliding and a lower level beyond",
+        "Canudas de Wit, Olsson, Astrom, Lischinsky 1995, IEEE TAC 40(3); its damping, passive",
+        (
+            size("stribeck_nm", "N m", "Stribeck level: breakaway above Coulomb friction"),
+            EffectParameter("bristle_nm_rad", math.inf, "N m/rad", "Stiffness of the bristles, "
+                            "sigma0; .inf: none", 1e-3, role="limit", fit=(0.01, 1e3)),
+            EffectParameter("velocity_rad_s", 0.1, "rad/s", "Stribeck velocity, where it has "
+                            "fallen to 1/e", 1e-4, 100.0, fit=(1e-3, 0.6)),
+            EffectParameter("damping_nm_s_rad", 0.0, "N m s/rad", "Damping of the bristles, "
+                            "sigma1, while they bend further", 0.0, 1e4),
+        ),
+        (
+            {"stribeck_nm": (0.01,), "bristle_nm_rad": (1.0, 10.0, 100.0),
+             "velocity_rad_s": (0.0025, 0.0125, 0.06), "damping_nm_s_rad": (0.005,)},
+        ),
+        contains=("stribeck_friction_motor", "presliding_friction"),
+    ),
+    Effect(
         "load_friction",
         "Motor Coulomb friction grows with the transmitted torque.",
         "transmission",
@@ -125,6 +149,25 @@ FRICTION: tuple[Effect, ...] = (
         "Hamon, Gautier, Garrec 2010, IROS, load-dependent gear friction",
         (size("coefficient", "", "Friction per transmitted torque", 0.0, 0.95, fit=(0.0, 0.5)),),
         ({"coefficient": (0.01, 0.05)},),
+    ),
+    Effect(
+        "directional_loss",
+        "The gear loses torque, forward another share than backward.",
+        "transmission",
+        "plant.torques:motor_level",
+        "as load friction, other where the load drives the motor",
+        "Wang, Kim 2015, IFToMM; gear efficiency forward and backward",
+        (
+            size("forward", "", "Friction per transmitted torque while the motor drives", 0.0,
+                 0.95, fit=(0.0, 0.5)),
+            size("backward", "", "Friction per transmitted torque while the load drives", 0.0,
+                 0.95, fit=(0.0, 0.5)),
+        ),
+        (
+            {"forward": (0.01, 0.05), "backward": (0.0,)},
+            {"forward": (0.0,), "backward": (0.01, 0.05)},
+        ),
+        contains=("load_friction",),
     ),
     Effect(
         "position_friction",

@@ -15,7 +15,7 @@ TRANSMISSION: tuple[Effect, ...] = (
         "backlash",
         "The transmission has a dead zone.",
         "transmission",
-        "plant.torques:spring_torque",
+        "plant.transmission:spring_torque",
         "low amplitude, more gain at 2-13 Hz",
         "Nordin, Gutman 2002, Automatica 38(10), dead-zone model",
         (size("half_gap_rad", "rad", "Half the dead zone of the deflection", 0.0, 1.0),),
@@ -27,7 +27,7 @@ TRANSMISSION: tuple[Effect, ...] = (
         "piecewise_stiffness",
         "The transmission is soft around zero deflection and stiffer beyond (strain-wave gear).",
         "transmission",
-        "plant.torques:spring_torque",
+        "plant.transmission:spring_torque",
         "near backlash, which it contains",
         "Spong 1987; manufacturers' three-slope stiffness of strain-wave gears",
         (
@@ -38,10 +38,20 @@ TRANSMISSION: tuple[Effect, ...] = (
         looks_like="dead or soft zone",
     ),
     Effect(
+        "asymmetric_stiffness",
+        "The transmission is stiffer in one direction than in the other.",
+        "transmission",
+        "plant.transmission:spring_torque",
+        "even lines and DC, growing as the amplitude",
+        "bilinear spring, k0 (1 + relative sgn d)",
+        (size("relative", "", "Half the difference of the stiffnesses over k0", -0.95, 0.95),),
+        ({"relative": (0.02,)},),
+    ),
+    Effect(
         "hysteresis",
         "The transmission torque depends on the history of the deflection.",
         "transmission",
-        "plant.torques:transmitted_torque",
+        "plant.transmission:transmitted_torque",
         "antiresonance damped",
         "Dahl 1968 on the deflection; the rate-independent Bouc-Wen model with n = 1",
         (
@@ -56,7 +66,7 @@ TRANSMISSION: tuple[Effect, ...] = (
         "transmission_damping",
         "The transmission has a viscous term.",
         "transmission",
-        "plant.torques:transmitted_torque",
+        "plant.transmission:transmitted_torque",
         "resonance damped at mid and high amplitude",
         "Spong 1987, ASME J. Dyn. Syst. 109(4), with joint damping",
         (size("nm_s_rad", "N m s/rad", "Torque per deflection velocity"),),
@@ -67,7 +77,7 @@ TRANSMISSION: tuple[Effect, ...] = (
         "kinematic_error",
         "The gear transmits an angle that is off periodically with the motor angle.",
         "transmission",
-        "plant.torques:deflection",
+        "plant.transmission:deflection",
         "even lines, flat with amplitude",
         "Tuttle, Seering 1996, IEEE Trans. Robotics and Automation 12(3)",
         ripple("amplitude_rad", "rad", 1.0, "the angle error"),
@@ -125,12 +135,14 @@ TRANSMISSION: tuple[Effect, ...] = (
                  negligible=1e-3),
             EffectParameter("link_inertia_share", 0.5, "", "Share of the inertia behind the "
                             "transmission", 0.01, 0.99),
-            EffectParameter("link_friction_share", 0.0, "", "Share of Coulomb and viscous friction "
-                            "behind the transmission", 0.0, 1.0),
+            EffectParameter("link_coulomb_share", 0.0, "", "Share of Coulomb friction behind the "
+                            "transmission", 0.0, 1.0),
+            EffectParameter("link_viscous_share", 0.0, "", "Share of viscous friction behind the "
+                            "transmission", 0.0, 1.0),
         ),
         (
             {"compliance_rad_nm": (0.02, 0.2, 1.0), "link_inertia_share": (0.3, 0.7),
-             "link_friction_share": (0.3,)},
+             "link_coulomb_share": (0.3,), "link_viscous_share": (0.3,)},
         ),
         same_as="a finite k0",
         of_bare_plant=True,

@@ -24,6 +24,7 @@ from fjr_interface.parameters import Parameter, ParameterGroup
 from fjr_kit.compiled import jit
 
 from .. import effects as fx
+from .places import FS, FSM, FV, FVM, JM, K0, K1, J
 from .presliding import with_bristles
 from .step_size import fastest_rate, pushes, reach, reach_within_energy
 from .stick_slip import (
@@ -34,7 +35,7 @@ from .stick_slip import (
     motor_direction,
     remembered,
 )
-from .torques import FS, FSM, FV, FVM, JM, K0, K1, J, deflection, deflection_speed, spring_region
+from .transmission import deflection, deflection_speed, spring_region
 
 __all__ = ["FS", "FSM", "FV", "FVM", "JM", "K0", "K1", "PLANT", "J", "advance", "coefficients"]
 
@@ -101,16 +102,17 @@ def with_added(values: Mapping[str, Any]) -> dict[str, float]:
     alone = rigid_sums(own)
     if alone is None or moves_as_one(values):
         return own
-    inertia, friction = (
-        values[f"transmission_stiffness.link_{of}_share"] for of in ("inertia", "friction")
+    inertia, coulomb, viscous = (
+        values[f"transmission_stiffness.link_{of}_share"]
+        for of in ("inertia", "coulomb", "viscous")
     )
     return {
         "jm": (1.0 - inertia) * alone["jm"],
         "j": inertia * alone["jm"],
-        "fs": friction * alone["fsm"],
-        "fsm": (1.0 - friction) * alone["fsm"],
-        "fv": friction * alone["fvm"],
-        "fvm": (1.0 - friction) * alone["fvm"],
+        "fs": coulomb * alone["fsm"],
+        "fsm": (1.0 - coulomb) * alone["fsm"],
+        "fv": viscous * alone["fvm"],
+        "fvm": (1.0 - viscous) * alone["fvm"],
         "k0": 1.0 / values["transmission_stiffness.compliance_rad_nm"],
         "k1": 0.0,
     }
@@ -135,10 +137,10 @@ def _advance(s, torque, w, duration, p, e):
     """Return state and build-up after a duration of constant torque."""
     link, motor = pushes(s, torque, w, p, e)
     twist = reach(s, link, motor, duration, p, e)
-    steps = fastest_rate(twist, s, p, e) * duration / _PHASE_PER_STEP
+    steps = fastest_rate(twist, s, torque, p, e) * duration / _PHASE_PER_STEP
     if steps > _CHEAP_SUBSTEPS:
         twist = min(twist, reach_within_energy(s, link, motor, duration, p, e))
-        steps = fastest_rate(twist, s, p, e) * duration / _PHASE_PER_STEP
+        steps = fastest_rate(twist, s, torque, p, e) * duration / _PHASE_PER_STEP
     if not (steps < _MAX_SUBSTEPS and math.isfinite(torque)):
         nan = math.nan
         return (nan, nan, nan, nan, nan, nan, nan), w

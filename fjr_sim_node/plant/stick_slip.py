@@ -15,20 +15,18 @@ from .motion import (
     flex_state,
     link_friction,
     link_torque,
+    motor_built_up,
     motor_friction,
     motor_torque,
     runge_kutta,
     transmitted,
 )
-from .torques import (
-    LINK_BRISTLES,
-    MOTOR_BRISTLES,
+from .places import LINK_BRISTLES, MOTOR_BRISTLES
+from .torques import link_level, motor_has_coulomb, motor_level
+from .transmission import (
     deflection,
     deflection_speed,
     lever_slope,
-    link_level,
-    motor_has_coulomb,
-    motor_level,
     next_region,
     region_margin,
     region_slope,
@@ -220,17 +218,10 @@ def remembered(s, m, w, p, e):
     if p[LINK_BRISTLES] != 0.0:
         link = link_friction(s, m, w, p, e)
     if p[MOTOR_BRISTLES] != 0.0:
-        motor = motor_friction(s, transmitted(s, m, w, p, e), m, w, p, e)
-    return (
-        link,
-        motor,
-        flex_state(s, m, w, e),
-        s[0],
-        s[2],
-        deflection(s[0], s[2], e),
-        w[6],
-        w[7],
-    )
+        level = motor_level(abs(s[3]), m[1], s[2], transmitted(s, m, w, p, e), p, e)
+        motor = motor_built_up(s, level, m, w, p)
+    built_up = link, motor, flex_state(s, m, w, e)
+    return (*built_up, s[0], s[2], deflection(s[0], s[2], e), w[6], w[7])
 
 
 @inlined

@@ -30,13 +30,14 @@ class _Motion:
     """One period of a model's motion, (realizations, N) each, and the loop's response to torque.
 
     Attributes:
-        motor, velocity, transmitted: rad, rad/s, N m.
+        motor, velocity, torque, transmitted: rad, rad/s, N m, N m.
         response: complex (realizations, lines), position per torque on the motor, rad/(N m).
         both: the same of a torque between link and motor.
     """
 
     motor: np.ndarray
     velocity: np.ndarray
+    torque: np.ndarray
     transmitted: np.ndarray
     response: np.ndarray
     both: np.ndarray
@@ -122,7 +123,7 @@ def _motion(
     recorded: RecordedExperiment, simulator: Simulator, misfit: Misfit, model: Model
 ) -> _Motion:
     description = recorded.experiment
-    y, _, q = simulator.motion(model, misfit.which)
+    y, u, q = simulator.motion(model, misfit.which)
     lines = np.arange(recorded.lines)
     excited = np.array(description.excited_harmonics)
     rate = description.sample_rate_hz
@@ -136,6 +137,7 @@ def _motion(
     return _Motion(
         motor=y,
         velocity=np.gradient(y, axis=1) * description.sample_rate_hz,
+        torque=u,
         transmitted=p.get("k0", 0.0) * twist,
         response=response,
         both=response * _of_pair(p, s),
@@ -167,6 +169,8 @@ def _of_ripple(
     if acts_on == "motor":
         changes = line_spectrum(-turns * np.sign(motion.velocity), lines) * motion.response
     elif acts_on == "drive":
+        if not fx.EFFECTS[effect].full_parameters[0].unit:  # a share of the torque, not a torque
+            turns = turns * motion.torque
         changes = line_spectrum(turns, lines) * motion.response
     else:
         slopes = cycles * np.array([np.cos(angle), -np.sin(angle)])

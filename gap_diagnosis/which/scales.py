@@ -95,7 +95,11 @@ class Scales:
         if parameter.absolute or parameter.role in ("angle", "cycles"):
             return 1.0
         if parameter.role == "limit":
-            return self.peak_torque_nm
+            return {
+                "N m": self.peak_torque_nm,
+                "N m/s": self.peak_torque_nm / self.period_s,
+                "N m/rad": self.torque_nm / self.angle_rad,
+            }[parameter.unit]
         inner = fx.EFFECTS[name.split(".", 1)[0]].acts_on == "transmission"
         return {
             "": 1.0,

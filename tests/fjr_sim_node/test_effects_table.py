@@ -29,6 +29,7 @@ def test_the_law_of_an_effect_is_where_its_entry_says(effect: fx.Effect) -> None
 def test_every_parameter_is_read_by_a_kernel() -> None:
     kernels = [
         "plant.torques",
+        "plant.transmission",
         "plant.presliding",
         "plant.motion",
         "plant.stick_slip",
@@ -64,6 +65,15 @@ def test_starts_name_parameters_of_their_effect_within_their_bounds() -> None:
                 if known[name].fit is None and known[name].unit:
                     high = math.inf  # a physical limit, not relative as the starts are
                 assert all(low <= value <= high for value in values), (effect.identifier, name)
+
+
+def test_what_an_effect_contains_is_another_effect_of_the_table() -> None:
+    for effect in fx.CATALOGUE:
+        assert set(effect.contains) <= set(fx.EFFECTS) - {effect.identifier}
+    assert fx.contains(("directional_loss",), ("load_friction",))
+    assert fx.contains(("delay", "directional_loss"), ("load_friction", "delay"))
+    assert not fx.contains(("load_friction",), ("directional_loss",))
+    assert not fx.contains(("delay", "directional_loss"), ("load_friction",))
 
 
 def test_near_equivalents_are_mutual_and_never_the_effect_itself() -> None:

@@ -197,7 +197,7 @@ def test_effects_of_transmission_and_link_are_not_looked_for_on_a_rigid_axis():
     assert fitted - set(fitter.catalogue) == {
         "stribeck_friction_link", "load_friction", "backlash", "piecewise_stiffness", "hysteresis",
         "transmission_damping", "kinematic_error", "extra_mode",
-        "coulomb_friction", "viscous_friction",
+        "coulomb_friction", "viscous_friction", "directional_loss", "asymmetric_stiffness",
     }  # fmt: skip
     refit = fitter.refit()
     assert set(refit.model.plant) == {"jm", "fsm", "fvm"}

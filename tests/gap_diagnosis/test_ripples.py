@@ -11,7 +11,7 @@ from gap_diagnosis.which.harmonics import with_second_harmonics
 from gap_diagnosis.which.ripples import RippleSearch
 
 SIZES = {"position_friction": "amplitude_nm", "kinematic_error": "amplitude_rad",
-         "cogging": "amplitude_nm"}  # fmt: skip
+         "cogging": "amplitude_nm", "torque_constant_ripple": "amplitude"}  # fmt: skip
 
 
 def ripple(effect, size, cycles, **more):
@@ -23,6 +23,7 @@ def ripple(effect, size, cycles, **more):
     ("position_friction", 0.8, 20.0, 5.0),
     ("kinematic_error", 3e-4, 33.0, 1.0),
     ("cogging", 0.8, 57.0, 1.0),
+    ("torque_constant_ripple", 0.05, 31.0, 1.0),
 ])  # fmt: skip
 def test_ripples_are_proposed_near_enough_for_the_fit_to_find_them(effect, size, cycles, off):
     case = simulate_case(ripple(effect, size, cycles), seed=3, **SHORT)
