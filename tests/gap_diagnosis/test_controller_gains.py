@@ -6,18 +6,21 @@ import math
 
 import numpy as np
 import pytest
+from paths import SHARED
 from scipy.signal import lfilter
 
 from controller_node.gains import free_gains, unknown_gains
 from controller_node.law import law_of
 from excitation_node import records
 from fjr_kit.errors import InputError
+from fjr_records.records import read_records
 from fjr_sim_node import plant
 from fjr_sim_node.simulation import closed_loop
 from gap_diagnosis.gates.controller_check import check_law
 from gap_diagnosis.gates.controller_gains import identify_gains
 
 RATE = 1000.0
+SERVO_RUNS = ("10h28m10", "10h28m42", "10h29m14", "10h29m47")
 PLANT = plant.coefficients(plant.PLANT.defaults())
 CASCADE = {
     "kind": "p_pi", "k_position": 12.0, "k_velocity": 40.0, "integral_time_s": 0.4,
@@ -188,3 +191,30 @@ def test_bad_signals_are_refused():
             identify_gains(description, *signals, RATE)
     with pytest.raises(InputError, match="'d' is not among the gains that are unknown"):
         law_of(description, RATE, {"p": 1.0, "d": 2.0})
+
+
+def test_the_gains_of_a_real_servo_are_those_of_its_firmware(tmp_path, run):
+    """Its gain was doubled from run to run; it counts PWM to 885."""
+    files = [SHARED / "data" / "bam_xl330" / f"2026-01-15_{t}.json.gz" for t in SERVO_RUNS]
+    if not all(file.exists() for file in files):
+        pytest.skip("the records of the servo are not there")
+    law = tmp_path / "law.yaml"
+    law.write_text("kind: pd\np: unknown\ntorque_limit_nm: unknown\n")
+    done = run(
+        "import", *files, "--out", tmp_path / "servo", "--controller", law,
+        "--map", "reference=entries.goal_position,position=entries.position",
+        "--map", "torque=entries.load:8.06e-4,time=entries.timestamp",
+    )  # fmt: skip
+    assert done.exit_code == 0, done.output
+    found = [
+        identify_gains(
+            r.controller, r.reference, r.torque, r.position, r.description.sample_rate_hz
+        )
+        for r in read_records(tmp_path / "servo").records
+    ]
+    gains = np.array([one.values["p"] for one in found])
+    assert np.allclose(gains[1:] / gains[:-1], 2.0, rtol=0.01)
+    assert min(one.explained for one in found) > 0.999
+    limits = [one.values["torque_limit_nm"] for one in found]
+    assert limits[:2] == [math.inf, math.inf]
+    assert limits[2:] == pytest.approx([885 * 8.06e-4] * 2, rel=1e-3)
