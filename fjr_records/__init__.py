@@ -19,7 +19,8 @@ from typing import TYPE_CHECKING
 from fjr_kit.public_names import deferred_names
 
 if TYPE_CHECKING:
-    from .experiment_folder import ExperimentFolder, Override, open_experiment
+    from .experiment_bag import Override
+    from .experiment_folder import ExperimentFolder, open_experiment
     from .recorded import RecordedExperiment, read_experiment
 else:
     __getattr__, __dir__ = deferred_names(__name__)
