@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
@@ -15,6 +15,7 @@ from fjr_kit.errors import InputError
 
 from .experiment_bag import ExperimentBag, Override
 from .experiment_folder import open_experiment
+from .records import reference_optional
 from .spectra import line_spectrum
 
 
@@ -139,7 +140,7 @@ def read_experiment(
         InputError: see `open_experiment`; or a bag that is damaged further on, or too short.
     """
     opened = open_experiment(
-        folder, _reference_optional(signal_map), override=override, resampling=resampling
+        folder, reference_optional(signal_map), override=override, resampling=resampling
     )
     realizations = tuple(_cut(bag) for bag in opened.bags)
     return RecordedExperiment(opened.source, realizations, opened.notes)
@@ -161,8 +162,3 @@ def _cut(bag: ExperimentBag) -> RecordedRealization:
     assert torque is not None and position is not None  # no bag is read without them
     return RecordedRealization(bag.name, bag.experiment, reference, torque, position, link)
 
-
-def _reference_optional(signal_map: SignalMap) -> SignalMap:
-    if signal_map.reference is None:
-        return signal_map
-    return replace(signal_map, reference=replace(signal_map.reference, required=False))
