@@ -10,6 +10,7 @@ import math
 from fjr_kit.compiled import inlined, jit
 
 from .. import effects as fx
+from .deflection import deflection, deflection_speed
 from .torques import (
     FS,
     FV,
@@ -20,8 +21,6 @@ from .torques import (
     LINK_BRISTLES,
     MOTOR_BRISTLES,
     J,
-    deflection,
-    deflection_speed,
     motor_level_bound,
 )
 
