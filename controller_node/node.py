@@ -7,7 +7,6 @@ import math
 import time
 
 from rclpy.duration import Duration
-from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
 from fjr_interface import topics
@@ -61,9 +60,7 @@ class ControllerNode(runtime.RigNode):
         self._tripped: str | None = None
         self._speed = Speed()
         self._excitations: frozenset[bytes] = frozenset()
-        self._torque = self.create_publisher(
-            JointState, topics.MOTOR_TORQUE.topic, runtime.SIGNAL_QOS
-        )
+        self._torque = self.offer(topics.MOTOR_TORQUE)
         self.claim(self._torque)
         on_position = self._on_position_in_real_time if self._real_time else self._on_position
         self._reference = Source(self, topics.REFERENCE, self._on_reference)

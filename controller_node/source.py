@@ -4,11 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from rclpy.node import Node
-from sensor_msgs.msg import JointState
-
 from fjr_interface.bags.joint_state import JointStateReader
-from fjr_interface.ros.runtime import SIGNAL_QOS
+from fjr_interface.ros.runtime import RigNode
 from fjr_interface.topics import Signal
 
 _UNKNOWN = "_NODE_NAME_UNKNOWN_"  # of a publisher whose node has not been heard of yet
@@ -24,12 +21,10 @@ class Source:
         names: full names of the publishers' nodes, sorted; one that publishes twice is there twice.
     """
 
-    def __init__(self, node: Node, signal: Signal, callback: Callable[[bytes], None]) -> None:
+    def __init__(self, node: RigNode, signal: Signal, callback: Callable[[bytes], None]) -> None:
         """Let a callback of the node hear a signal."""
         self.topic = signal.topic
-        self.subscription = node.create_subscription(
-            JointState, signal.topic, callback, SIGNAL_QOS, raw=True
-        )
+        self.subscription = node.hear(signal, callback)
         self.decode = JointStateReader(signal.field).decode
         self._node = node
         self._count = 0
