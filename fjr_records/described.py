@@ -33,13 +33,13 @@ def descriptions(readers: Sequence[BagReader]) -> list[Experiment] | None:
     Raises:
         InputError: some have one and some have none, or one is of a record that is not periodic.
     """
-    described = [reader for reader in readers if reader.experiment is not None]
-    if not described:
+    with_one = [reader for reader in readers if reader.experiment is not None]
+    if not with_one:
         return None
     for reader in readers:
         if reader.experiment is None:
             raise InputError(
-                f"{reader.path.name} has no experiment description but {described[0].path.name} "
+                f"{reader.path.name} has no experiment description but {with_one[0].path.name} "
                 "has one; put them into separate folders."
             )
     return [
