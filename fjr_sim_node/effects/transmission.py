@@ -66,7 +66,7 @@ TRANSMISSION: tuple[Effect, ...] = (
         "kinematic_error",
         "The gear transmits an angle that is off periodically with the motor angle.",
         "transmission",
-        "plant.deflection:deflection",
+        "plant.torques:deflection",
         "even lines, flat with amplitude",
         "Tuttle, Seering 1996, IEEE Trans. Robotics and Automation 12(3)",
         ripple("amplitude_rad", "rad", 1.0, "the angle error"),

@@ -23,12 +23,17 @@ from typing import Any
 from fjr_interface.parameters import Parameter, ParameterGroup
 from fjr_kit.compiled import jit
 
-from .deflection import deflection, deflection_speed, spring_region
 from .presliding import with_bristles
-from .slip_direction import flex_direction, link_direction, motor_direction
 from .step_size import fastest_rate, pushes, reach, reach_within_energy
-from .stick_slip import advance_smoothly, facing, remembered
-from .torques import FS, FSM, FV, FVM, JM, K0, K1, J
+from .stick_slip import (
+    advance_smoothly,
+    facing,
+    flex_direction,
+    link_direction,
+    motor_direction,
+    remembered,
+)
+from .torques import FS, FSM, FV, FVM, JM, K0, K1, J, deflection, deflection_speed, spring_region
 
 __all__ = ["FS", "FSM", "FV", "FVM", "JM", "K0", "K1", "PLANT", "J", "advance", "coefficients"]
 

@@ -1,6 +1,6 @@
 """Smooth motion of the plant between events: torques on each side, one Runge-Kutta step.
 
-In this module, in `slip_direction`, `stick_slip` and `plant`
+In this module, in `stick_slip` and in `plant`
     s = (q, vq, th, vth, q3, v3, lagged torque), the last three at rest without effects;
     m = (link, motor, flex, region): slip directions, 0 while a side sticks, direction in which the
         deflection changes, smooth part of the spring that it is in;
@@ -17,7 +17,6 @@ import math
 from fjr_kit.compiled import inlined, jit
 
 from .. import effects as fx
-from .deflection import deflection
 from .presliding import bristle_torque
 from .torques import (
     FS,
@@ -27,6 +26,7 @@ from .torques import (
     MOTOR_BRISTLES,
     J,
     build_up,
+    deflection,
     link_drive,
     link_level,
     link_viscous,

@@ -10,7 +10,6 @@ import math
 from fjr_kit.compiled import inlined, jit
 
 from .. import effects as fx
-from .deflection import deflection, deflection_speed
 from .torques import (
     FS,
     FV,
@@ -21,6 +20,8 @@ from .torques import (
     LINK_BRISTLES,
     MOTOR_BRISTLES,
     J,
+    deflection,
+    deflection_speed,
     motor_level_bound,
 )
 

@@ -1,4 +1,4 @@
-"""Stick and slip: when a smooth motion ends, and the motion through such events.
+"""Stick and slip: which way each side goes, when that ends, and the motion through such events.
 
 An event is a velocity that reaches zero, a torque on a stuck side that reaches the Coulomb level, a
 deflection that turns round or enters another part of the spring. It is located by root finding on
@@ -10,7 +10,6 @@ from __future__ import annotations
 from fjr_kit.compiled import inlined, jit
 
 from .. import effects as fx
-from .deflection import deflection, deflection_speed, next_region, region_margin, region_slope
 from .motion import (
     derivative,
     flex_state,
@@ -21,11 +20,84 @@ from .motion import (
     runge_kutta,
     transmitted,
 )
-from .slip_direction import deflection_acceleration, link_direction, motor_direction
-from .torques import LINK_BRISTLES, MOTOR_BRISTLES, link_level, motor_has_coulomb, motor_level
+from .torques import (
+    LINK_BRISTLES,
+    MOTOR_BRISTLES,
+    deflection,
+    deflection_speed,
+    lever_slope,
+    link_level,
+    motor_has_coulomb,
+    motor_level,
+    next_region,
+    region_margin,
+    region_slope,
+)
 
 _MAX_EVENTS = 32
 _FROM_ZERO = 1e-9  # a margin that starts below this share of its fall starts from zero
+
+
+@inlined
+def _creep_direction(excess, direction):
+    """Return where a side with presliding friction goes from rest under an excess of torque.
+
+    In balance neither direction is right; if one has just proved wrong it is the other.
+    """
+    if excess == 0.0:
+        return -direction if direction != 0.0 else 1.0
+    return 1.0 if excess > 0.0 else -1.0
+
+
+@inlined
+def link_direction(s, m, w, p, e):
+    """Return the link's slip direction, 0 if it sticks; a side without friction always slips."""
+    if s[1] > 0.0:
+        return 1.0
+    if s[1] < 0.0:
+        return -1.0
+    te = transmitted(s, m, w, p, e)
+    drive = link_torque(s, te, p, e)
+    if e is not None and p[LINK_BRISTLES] != 0.0:
+        return _creep_direction(drive - link_friction(s, m, w, p, e), m[0])
+    level = link_level(0.0, p, e)
+    if level == 0.0 or drive > level:
+        return 1.0
+    if drive < -level:
+        return -1.0
+    return 0.0
+
+
+@inlined
+def motor_direction(s, torque, m, w, p, e):
+    """Return the motor's slip direction, 0 if it sticks."""
+    if s[3] > 0.0:
+        return 1.0
+    if s[3] < 0.0:
+        return -1.0
+    te = transmitted(s, m, w, p, e)
+    drive = motor_torque(s, te, torque, e)
+    if e is not None and p[MOTOR_BRISTLES] != 0.0:
+        return _creep_direction(drive - motor_friction(s, te, m, w, p, e), m[1])
+    if not motor_has_coulomb(p, e):
+        return 1.0
+    direction = 1.0 if drive > 0.0 else -1.0
+    level = motor_level(0.0, direction, s[2], te, p, e)
+    return direction if abs(drive) > level else 0.0
+
+
+@inlined
+def _deflection_acceleration(s, d, e):
+    return deflection_speed(d[1], s[2], d[3], e) - lever_slope(s[2], e) * s[3] * s[3]
+
+
+@inlined
+def flex_direction(s, torque, m, w, p, e):
+    """Return the direction in which the deflection changes."""
+    speed = deflection_speed(s[1], s[2], s[3], e)
+    if speed == 0.0:
+        speed = _deflection_acceleration(s, derivative(s, torque, m, w, p, e), e)
+    return 1.0 if speed >= 0.0 else -1.0
 
 
 @inlined
@@ -85,7 +157,7 @@ def _margin_slope(which, s, torque, m, w, p, e):
     if which == 1 or e is None:
         return d[3] * m[1]
     if which == 2:
-        return deflection_acceleration(s, d, e) * m[2]
+        return _deflection_acceleration(s, d, e) * m[2]
     speed = deflection_speed(s[1], s[2], s[3], e)
     return region_slope(deflection(s[0], s[2], e), speed, m[3], e)
 

@@ -27,8 +27,6 @@ def test_the_law_of_an_effect_is_where_its_entry_says(effect: fx.Effect) -> None
 def test_every_parameter_is_read_by_a_kernel() -> None:
     kernels = [
         "plant.torques",
-        "plant.deflection",
-        "plant.slip_direction",
         "plant.presliding",
         "plant.motion",
         "plant.stick_slip",
