@@ -2,9 +2,8 @@
 
 Reference and measured position go in, motor torque comes out. Begin with `pd_filtered` (the
 default law, paper eq. 12); `transfer_function` is any other linear law, `controller_file` the form
-in which a user states one. `safety` acts on the `limits` and holds trips, `supervised_law` puts the
-law behind it. `lockstep` waits for the reference of each position, `real_time` answers on the wall
-clock (`pace` compares stamps with it); `node` speaks ROS and hears each signal from one `source`.
+in which a user states one. `safety` holds limits and trips, `supervised_law` puts the law behind
+them, `real_time` answers on the wall clock, `node` speaks ROS.
 
     >>> from controller_node import CONTROLLER, describe
     >>> describe(CONTROLLER.check({"p": 150.0}))  # as an experiment description holds it
