@@ -15,7 +15,8 @@ from fjr_interface.bags.reader import DEFAULT, SignalMap
 from fjr_interface.resampling.accuracy import Resampling
 from fjr_kit.check import Check
 from fjr_kit.errors import InputError
-from fjr_records.experiment_folder import ExperimentBag, ExperimentFolder, Override, open_experiment
+from fjr_records.experiment_bag import ExperimentBag, Override
+from fjr_records.experiment_folder import ExperimentFolder, open_experiment
 from fjr_records.realization import Realization, read_realization, signal_blocks
 
 from .bla.fast import fast_bla

@@ -14,7 +14,7 @@ from .record_options import MapSignals, Periods, Resample, SamplesPerPeriod, Tra
 
 if TYPE_CHECKING:
     from fjr_interface.resampling.accuracy import Resampling
-    from fjr_records.experiment_folder import Override
+    from fjr_records.experiment_bag import Override
 
 
 class MethodChoice(str, Enum):
@@ -57,7 +57,7 @@ def analyze(
 ) -> None:
     """Estimate BLA, noise and nonlinear distortion from bags, and write a report."""
     from fjr_interface.resampling.accuracy import Resampling
-    from fjr_records.experiment_folder import Override
+    from fjr_records.experiment_bag import Override
 
     override = Override(samples_per_period, transient_periods, periods)
     resampling = Resampling.parse(resample) if resample else None

@@ -32,7 +32,8 @@ def import_records(
         ),
     ],
     out: Annotated[
-        Path | None, typer.Option(help="Experiment folder to make; not with --dry-run.")
+        Path | None,
+        typer.Option(metavar="FOLDER", help="New experiment folder; needed without --dry-run."),
     ] = None,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Show what is understood of the files; write nothing.")
@@ -52,9 +53,7 @@ def import_records(
         ),
     ] = None,
     samples_per_period: SamplesPerPeriod = None,
-    transient_periods: Annotated[
-        int, typer.Option(min=0, help="Leading periods that are transient.")
-    ] = 1,
+    transient_periods: Annotated[int, typer.Option(min=0, help="Leading periods to discard.")] = 1,
     periods: Periods = None,
     repeat_reference: Annotated[
         bool,

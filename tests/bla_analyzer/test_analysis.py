@@ -19,7 +19,7 @@ from fjr_interface.experiment import Experiment
 from fjr_interface.topics import SIGNALS
 from fjr_kit.errors import InputError
 from fjr_records.discover import discover
-from fjr_records.experiment_folder import Override
+from fjr_records.experiment_bag import Override
 from fjr_records.lines import Grid
 from fjr_records.realization import read_realization
 
