@@ -54,12 +54,7 @@ SETTINGS: tuple[str, ...] = (
     "heating_relative", "heating_nm", "heating_time_s", "bending_nm_s_rad", "bending_rad",
     "interpolation_rad", "interpolation_cycles", "wander_nm", "jitter_s",
 )  # fmt: skip
-<<<<<<< HEAD
 """Settings, zero if off; from eyring_nm on they are outside any catalogue."""
-=======
-"""Settings, zero if off; from absorber_kg_m2 on all but slew_nm_s, deadband_nm, stiffness_asymmetry
-and ripple are outside the catalogue."""
->>>>>>> catalog
 
 (
     STRIBECK_M, STRIBECK_MV, STRIBECK_L, STRIBECK_LV, ASYM_C, ASYM_V, BIAS, GMS_M, GMS_L, LOAD,
