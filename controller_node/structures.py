@@ -7,6 +7,7 @@ experiment description. A gain is a number or `unknown`; a law is made once all 
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
@@ -77,9 +78,9 @@ class Structure(_Part):
     torque_limit_nm: Rate | None = None
     feed_forward: FeedForward = FeedForward()
 
+    @abstractmethod
     def ratios(self, period_s: float) -> tuple[Ratio, Ratio]:
         """Return C_r without feed-forward, and C_y; all gains must be numbers."""
-        raise NotImplementedError
 
     def law(self, sample_rate_hz: float, source: str) -> TransferFunction:
         """Return the law at a rate; all gains must be numbers.
