@@ -33,7 +33,7 @@ BLA_COLUMNS = {
 UNITS = units(LevelResult)
 """Unit of every numeric field of a level."""
 
-HEADER = b"MATLAB 5.0 MAT-file, fjr_rig/result/1"
+HEADER = b"MATLAB 5.0 MAT-file, fjr_rig/result/2"
 
 
 def frf_csv(result: Result) -> str:
