@@ -26,7 +26,7 @@ from fjr_records.discover import NoPeriodError
 from fjr_records.experiment_folder import ExperimentBag, ExperimentFolder, Override, open_experiment
 from fjr_records.lines import Grid, Lines
 from fjr_records.realization import Realization, read_realization, signal_blocks
-from fjr_records.records import read_records
+from fjr_records.records import read_records, reference_optional
 from fjr_records.spectra import RealizationSpectra
 
 from .bla.arbitrary import arbitrary_bla, run_of_lines
@@ -79,14 +79,11 @@ def analyze(
         raise InputError(f"method must be robust, fast or local, not {method!r}.")
     sources = replace(signal_map, link=None)
     experiment = _periodic(folder, sources, override, resampling)
-    if isinstance(experiment, str):
+    if isinstance(experiment, NoPeriodError):
         if method in ("robust", "fast"):
-            raise InputError(
-                f"{folder}: {experiment}; the {method} method is for multisines, so leave --method "
-                "out or take --method local."
-            )
+            raise experiment
         records = read_records(folder, sources, resampling=resampling)
-        records = replace(records, notes=(f"Not periodic: {experiment}.", *records.notes))
+        records = replace(records, notes=(_not_periodic(experiment), *records.notes))
         return analyze_records(records, models)
     realizations = _read(experiment, progress)
     levels: list[LevelResult] = []
@@ -124,13 +121,14 @@ def _periodic(
     signal_map: SignalMap,
     override: Override | None,
     resampling: Resampling | None,
-) -> ExperimentFolder | str:
+) -> ExperimentFolder | NoPeriodError:
     """Return the experiment, or why it is none of multisines.
 
     Raises:
         InputError: bags of both kinds, or bags that are damaged.
     """
-    readers = [open_bag(bag, signal_map, resampling) for bag in find_bags(folder)]
+    optional = reference_optional(signal_map)
+    readers = [open_bag(bag, optional, resampling) for bag in find_bags(folder)]
     records = [r.path.name for r in readers if isinstance(r.experiment, RecordDescription)]
     if records:
         if len(records) < len(readers):
@@ -139,13 +137,20 @@ def _periodic(
                 f"{folder}: {records[0]} is a record that is not periodic but {other} is a "
                 "multisine; put them into separate folders."
             )
-        return "the bags are described as records"
+        return NoPeriodError(
+            f"{folder}: described as records that are not periodic; robust and fast method are for "
+            "multisines, so leave the method out."
+        )
     try:
         return open_experiment(folder, signal_map, override=override, resampling=resampling)
     except NoPeriodError as error:
         if any(r.experiment is not None for r in readers) or override not in (None, Override()):
             raise
-        return str(error).partition("; ")[0].rstrip(".")
+        return error
+
+
+def _not_periodic(why: NoPeriodError) -> str:
+    return f"Not analysed as periodic: {str(why).partition('; ')[0].rstrip('.')}."
 
 
 def _read(experiment: ExperimentFolder, progress: Progress | None) -> list[Realization]:
@@ -183,10 +188,11 @@ def _analyze_level(
 ) -> tuple[LevelResult, list[Check], list[str]]:
     lines = experiment.grid.lines
     checks = [check for one in group for check in check_realization(one, lines.excited)]
-    spectra, notes = _pool(level, group, experiment)
+    groups, notes = _by_reference(level, group, experiment)
+    spectra = [pooled([one.spectra for one in members]) for members in groups]
     chosen = method or _fitting_method(spectra, lines)
     used = spectra[:1] if chosen == "fast" else spectra
-    reason = _refusal(group, len(spectra), chosen)
+    reason = _refusal(groups[0] if chosen == "fast" else group, len(spectra), chosen)
     bla = None
     if reason is None:
         bla = _estimate(used, experiment.grid, chosen)
@@ -196,24 +202,25 @@ def _analyze_level(
     return result, checks, [f"level {level}: {note}" for note in notes]
 
 
-def _pool(
+def _by_reference(
     level: int, group: Sequence[Realization], experiment: ExperimentFolder
-) -> tuple[list[RealizationSpectra], list[str]]:
-    """Return the spectra of each reference, its repeats pooled, and what to say of it."""
+) -> tuple[list[list[Realization]], list[str]]:
+    """Return the realizations of each reference, and what to say where there are repeats."""
     described = {
         bag.realization: bag.experiment.repeat_of for bag in experiment.bags if bag.level == level
     }
     numbers = [one.realization for one in group]
-    spectra = [one.spectra for one in group]
-    groups = repeat_groups(spectra, [described[number] for number in numbers], numbers)
+    found = repeat_groups(
+        [one.spectra for one in group], [described[number] for number in numbers], numbers
+    )
     notes = []
-    if len(groups) < len(group):
+    if len(found) < len(group):
         notes.append(
-            f"{len(group)} realizations play {len(groups)} different references; those of the same "
+            f"{len(group)} realizations play {len(found)} different references; those of the same "
             "reference are averaged as further periods of one, and what differs between them "
             "counts as noise."
         )
-    return [pooled([spectra[i] for i in members]) for members in groups], notes
+    return [[group[i] for i in members] for members in found], notes
 
 
 def _fitting_method(spectra: Sequence[RealizationSpectra], lines: Lines) -> Method:

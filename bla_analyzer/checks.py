@@ -134,9 +134,9 @@ def reliable_lines(level: int, bla: BlaEstimate | None) -> Check:
     sentence = f"{1.0 - share:.0%} of the {lines} lines of the BLA can be used."
     if share > UNRELIABLE_LIMIT:
         sentence = (
-            f"{share:.0%} of the {lines} lines of the BLA are unreliable: the torque hardly follows "
-            "the reference there, or the 95 % disc holds zero; excite more, or check that the "
-            "reference belongs to this record."
+            f"{share:.0%} of the {lines} lines of the BLA are unreliable: the torque hardly "
+            "follows the reference there, or the 95 % disc holds zero; excite more, or check that "
+            "the reference belongs to this record."
         )
     if bla is None:
         sentence = "there is no BLA."

@@ -75,8 +75,8 @@ def discover(
         period_samples: N, if it is known.
 
     Raises:
-        NoPeriodError: the reference is constant, does not repeat, its period is not a whole number of
-            samples, or its lines do not stand out.
+        NoPeriodError: the reference is constant, does not repeat, its period is not a whole number
+            of samples, or its lines do not stand out.
     """
     period = period_samples or find_period(name, reference)
     count = reference.size // period

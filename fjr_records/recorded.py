@@ -160,4 +160,3 @@ def _cut(bag: ExperimentBag) -> RecordedRealization:
     )
     assert torque is not None and position is not None  # no bag is read without them
     return RecordedRealization(bag.name, bag.experiment, reference, torque, position, link)
-

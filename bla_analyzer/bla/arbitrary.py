@@ -1,4 +1,4 @@
-"""The BLA from records of any excitation: windows chosen by rule, lines without excitation left out.
+"""The BLA from records of any excitation: windows by rule, lines without excitation left out.
 
 At each frequency the local polynomial fit (`local_fit`) needs a window: wide windows average noise
 away, narrow ones follow resonances. The rule, for windows that grow by steps: fit polynomials of
@@ -39,7 +39,7 @@ SCAN_PER_DECADE = 40
 MOST_LINES = 1200
 INPUT_VARIANCE_LOST = 0.1
 """Var(U)/|U|^2 from which a line is left out: discs no longer cover beyond (`robust`)."""
-SILENT = 1e-10
+SILENT = 1e-16
 """Power of the reference relative to its strongest line, below which nothing was played."""
 HIGHEST = 0.45
 """Highest frequency of an estimate over the sample rate."""
@@ -199,7 +199,7 @@ def _window(runs: Sequence[Run], at_hz: float, half: float) -> tuple[float, floa
 
 
 def _half_widths(runs: Sequence[Run], centres: np.ndarray) -> np.ndarray:
-    """Return half the width of the window at each frequency, (C,), NaN where none is wide enough."""
+    """Return half the width of the window at each frequency, (C,); NaN where none will do."""
     least = np.array([_least_half(runs, f) or np.nan for f in centres])
     halves, growing = least.copy(), np.isfinite(least)
     for step in range(1, 40):
@@ -261,9 +261,10 @@ def _estimate(
     input_power = np.array([abs(fit.torque) ** 2 for fit in fits]) * np.abs(turn) ** 2
     var_total = np.array([fit.variance for fit in fits]) / input_power
     left = np.array([fit.of_residual(fit.residual) for fit in fits]) / np.abs(turn) ** 2
-    noise = np.array(
-        [np.nan if fit.noise is None else fit.of_residual(fit.noise) for fit in fits]
-    ) / np.abs(turn) ** 2
+    noise = (
+        np.array([np.nan if fit.noise is None else fit.of_residual(fit.noise) for fit in fits])
+        / np.abs(turn) ** 2
+    )
     spread = np.array([fit.spread for fit in fits])
     var_noise = noise * spread / np.abs([fit.torque for fit in fits]) ** 2
     var_input = spread * np.array([fit.residual[0, 0].real for fit in fits])

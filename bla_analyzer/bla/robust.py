@@ -91,7 +91,7 @@ def confidence_radius(
 
 
 def coherence(g: np.ndarray, var_one: np.ndarray) -> np.ndarray:
-    """Return the squared coherence of Y and G U where `var_one` is the variance of one Y/U, (F,)."""
+    """Return the squared coherence of Y and G U, `var_one` the variance of one Y/U, (F,)."""
     power = np.abs(g) ** 2
     return np.asarray(power / (power + var_one))
 
