@@ -103,7 +103,7 @@ def described(
                 f"{one.name} and {two.name} are of one level but differ in amplitude_rad; put "
                 "them into separate folders."
             )
-    return grid, tuple(bags), [*_missing(bags, experiments), *_repeating(bags)]
+    return grid, tuple(bags), _missing(bags, experiments)
 
 
 def _in_order(experiment: Experiment) -> Experiment:
@@ -127,13 +127,3 @@ def _missing(bags: Sequence[ExperimentBag], experiments: Sequence[Experiment]) -
         elif count[level] < planned:
             notes.append(f"level {level} has {count[level]} of {planned} planned realizations.")
     return notes
-
-
-def _repeating(bags: Sequence[ExperimentBag]) -> list[str]:
-    repeats = [bag.name for bag in bags if bag.experiment.repeat_of is not None]
-    if not repeats:
-        return []
-    return [
-        f"{', '.join(repeats)} repeat the reference of another bag but are counted as realizations "
-        "of their own, so the stochastic nonlinear distortion is underestimated."
-    ]
