@@ -3,7 +3,7 @@
 An entry (`entry.Effect`) holds identifier, law, parameters with unit, bounds and source, what the
 effect acts on, starts of fits, near and exact equivalents, and telltale. Node parameters, parameter
 files, fits, documents and reports all read it. To add an effect, add its entry to `friction`,
-`transmission` or `drive` and write its law (`plant.torques` or `simulation.rig`), where
+`transmission` or `drive` and write its law (in `plant` or `simulation.rig`), where
 `fx.EFFECT_PARAMETER`, in capitals, is the place of a parameter among the coefficients. What is the
 bare plant with other values (friction that a datasheet lacks) needs no kernel: `plant.with_added`.
 

@@ -167,6 +167,7 @@ FRICTION: tuple[Effect, ...] = (
             {"forward": (0.01, 0.05), "backward": (0.0,)},
             {"forward": (0.0,), "backward": (0.01, 0.05)},
         ),
+        same_as="load_friction with all parameters behind the gear scaled, while the motor slides",
         contains=("load_friction",),
     ),
     Effect(

@@ -19,6 +19,7 @@ LINK, MOTOR = 0, 2
 
 _TIME, _SLEWED, _HEAD, _RING = 10, 11, 12, 13
 _RING_SIZE = 16_384  # samples of the longest delay: 100 ms at 20 kHz, each in eight parts
+_SLEW_PARTS = 4
 
 
 def at_rest(elapsed_s: float = 0.0) -> np.ndarray:
@@ -91,6 +92,8 @@ def driven(x, command, sample_period, e):
 def hold(x, command, sample_period, p, e):
     """Advance the rig in place by one sample period under a held torque command.
 
+    A torque that slews is no held torque: it is followed in parts.
+
     Args:
         x: state from `at_rest`.
         command: commanded torque u (N m).
@@ -101,6 +104,13 @@ def hold(x, command, sample_period, p, e):
     if e is None:
         x[0], x[1], x[2], x[3] = advance(x[0], x[1], x[2], x[3], command, sample_period, p)
         return
+    parts = 1 if e[fx.TORQUE_SLEW_LIMIT_LIMIT_NM_S] == math.inf else _SLEW_PARTS
+    for _ in range(parts):
+        _hold_with_effects(x, command, sample_period / parts, p, e)
+
+
+@jit
+def _hold_with_effects(x, command, sample_period, p, e):
     torque = driven(x, command, sample_period, e)
     friction = max(1.0 + e[fx.NONSTATIONARY_FRICTION_PER_S] * x[_TIME], 0.0)
     x[_TIME] += sample_period
