@@ -14,8 +14,6 @@ from functools import partial
 
 import numpy as np
 
-from fjr_sim_node import effects as fx
-
 from ..model.evidence import Evidence
 from ..model.simulated_rig import Model
 from .least_squares import Solution, solve
@@ -173,15 +171,3 @@ class CellFitter:
         model = space.model(x)
         scores = self.score(model, variance, self.select_parts)
         return CellFit(effects, space, model, ended, variance, scores)
-
-
-def catalogue(nominal: Mapping[str, float], asked: Sequence[str] | None = None) -> list[str]:
-    """Return the effects that a rig can have, or those of them that were asked for."""
-    rigid = "k0" not in nominal
-    return [
-        effect.identifier
-        for effect in fx.CATALOGUE
-        if effect.starts
-        and (effect.on_rigid_axis or not rigid)
-        and (asked is None or effect.identifier in asked)
-    ]

@@ -13,6 +13,7 @@ from fjr_sim_node import effects as fx
 
 from ..model.misfit import Misfit
 from ..model.simulated_rig import Model, Simulator
+from .catalogue import catalogue
 from .least_squares import Solution, solve
 from .ripples import RippleSearch
 from .screening import Proposal, Screening
@@ -66,6 +67,7 @@ class Fitter:
         tolerance: how far a datasheet value may be off, relative.
         train, held: misfit of the realizations to fit, and of those to judge by.
         peak_torque_nm: greatest torque of the record.
+        catalogue: effects to look for.
     """
 
     def __init__(
@@ -77,6 +79,7 @@ class Fitter:
         train: Sequence[int],
         held: Sequence[int],
         tolerance: float = TOLERANCE,
+        effects: Sequence[str] | None = None,
     ) -> None:
         """Prepare.
 
@@ -88,7 +91,9 @@ class Fitter:
             train: realizations to fit.
             held: realizations to judge by.
             tolerance: how far a datasheet value may be off, relative.
+            effects: identifiers to look for; None for all.
         """
+        self.catalogue = catalogue(nominal, effects)
         self.recorded, self._simulator = recorded, simulator
         self._levels = [realization.level for realization in recorded.realizations]
         self._misfit = lambda which: Misfit(recorded, simulator, noise_std, which)
@@ -97,16 +102,6 @@ class Fitter:
         self.train = Misfit(recorded, simulator, noise_std, train)
         self.held = Misfit(recorded, simulator, noise_std, held)
         self.peak_torque_nm = max(float(np.abs(r.torque).max()) for r in recorded.realizations)
-
-    @property
-    def catalogue(self) -> list[str]:
-        """Effects that this rig can have: a rigid axis has none of transmission and link."""
-        rigid = "k0" not in self.nominal
-        return [
-            effect.identifier
-            for effect in fx.CATALOGUE
-            if effect.starts and (effect.on_rigid_axis or not rigid)
-        ]
 
     def refit(self) -> Fit:
         """Fit the base parameters alone, level after level added from the lowest amplitude up.
