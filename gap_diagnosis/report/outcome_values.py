@@ -1,4 +1,4 @@
-"""What every report of a diagnosis shows, steady periods or records: the template's common values."""
+"""What every report of a diagnosis shows, of steady periods or of records: common values."""
 
 from __future__ import annotations
 

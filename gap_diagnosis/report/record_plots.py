@@ -6,6 +6,7 @@ Colours and dashes of the models are those of the plots of steady periods.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -54,7 +55,7 @@ def _bands(found: RecordComparison, noise_known: bool) -> Plot:
     """Return the rms error in each band after each step."""
     edges = found.edges_hz
     names = [f"0{chr(0x2013)}{edges[1]:.2g}"]
-    names += [f"{a:.2g}{chr(0x2013)}{b:.2g}" for a, b in zip(edges[1:-1], edges[2:], strict=True)]
+    names += [f"{a:.2g}{chr(0x2013)}{b:.2g}" for a, b in pairwise(edges[1:])]
     at = np.arange(len(names), dtype=float)
     unit = _SIGMA if noise_known else "of the motion"
     traces = []
