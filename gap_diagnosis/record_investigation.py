@@ -7,16 +7,17 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from fjr_kit.errors import InputError
 from fjr_records.records import Record, RecordSet
 from fjr_sim_node import effects as fx
 
 from .model.evidence import Evidence
 from .model.simulated_rig import Model
+from .notes import OUT_OF_TIME
 from .outcome.diagnosis import Diagnosis
-from .record_judgement import Tested, judge_records, tested_causes
+from .record_judgement import FEWEST_PARTS, Tested, judge_records, tested_causes
+from .which.catalogue import catalogue
 from .which.cell_fits import CellFitter
-from .which.search_space import TOLERANCE, catalogue
+from .which.search_space import TOLERANCE
 from .which.stepwise import Found, Stepwise, gain, stands_for
 
 Progress = Callable[[str], None]
@@ -43,6 +44,11 @@ class RecordInvestigation:
     tested: tuple[Tested, ...]
     diagnosis: Diagnosis
 
+    @property
+    def recorded(self) -> RecordSet:
+        """The records."""
+        return self.evidence.records
+
 
 def investigate_records(
     records: RecordSet,
@@ -68,17 +74,12 @@ def investigate_records(
             effect of an unknown name.
     """
     begun = time.monotonic()
-    unknown = [name for name in effects or () if name not in fx.EFFECTS]
-    if unknown:
-        raise InputError(
-            f"effects: {unknown[0]} is no effect; the effects are {', '.join(fx.EFFECTS)}."
-        )
     model = Model.nominal(nominal)
+    names = catalogue(model.plant, effects)
     records, cut = _within(records)
     progress("windows and noise")
     evidence = Evidence(records)
     fitter = CellFitter(evidence, model.plant, tolerance)
-    names = [e for e in catalogue(model.plant) if effects is None or e in effects]
     found = Stepwise(fitter, names, progress, begun + budget_s).run()
     found, tested = _kept(fitter, found, progress)
     progress("what may stand in for a cause")
@@ -117,7 +118,12 @@ def _first(record: Record, samples: int) -> Record:
 
 
 def _kept(fitter: CellFitter, found: Found, progress: Progress) -> tuple[Found, list[Tested]]:
-    """Take out, one at a time, the causes that do not pass the tests beside the others."""
+    """Take out, one at a time, the causes that do not pass the tests beside the others.
+
+    Where too little is held out, no cause is kept.
+    """
+    if len(fitter.evidence.parts_for("select")) < FEWEST_PARTS:
+        return replace(found, steps=found.steps[:1]), []
     steps, tested = list(found.steps), []
     while steps[-1].effects:
         progress(f"tests of {' + '.join(steps[-1].effects)}")
@@ -168,5 +174,5 @@ def _notes(evidence: Evidence, found: Found) -> list[str]:
             "what the observer adds."
         )
     if not found.complete:
-        notes.append("The time budget ended the search before all effects were tried.")
+        notes.append(OUT_OF_TIME)
     return notes

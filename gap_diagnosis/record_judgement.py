@@ -111,7 +111,7 @@ class Ledger:
     def __init__(self, evidence: Evidence) -> None:
         """Take the evidence; the parts that select stand in where none reports."""
         self.evidence = evidence
-        self.parts = evidence.parts_for("report") or evidence.parts_for("select", "fit")
+        self.parts = evidence.reporting
         self.runs = sorted({evidence.parts[p].record for p in self.parts})
         self._part = evidence.part_of(self.parts)
         energy = {
@@ -146,6 +146,19 @@ class Ledger:
             nrmse_position=float(np.sqrt(np.mean(self.squares(model)))),
             nrmse_torque=float(np.sqrt(np.mean(torque))),
             chi2_per_dof=chi2,
+        )
+
+    def noise(self) -> Gap | None:
+        """Return the gap that noise alone leaves; None where it is not known."""
+        evidence = self.evidence
+        if not evidence.noise.known:
+            return None
+        each = evidence.noise.std_rad**2 / self._scale
+        windows = sum(evidence.windows(p) for p in self.parts)
+        return Gap(
+            nrmse_position=float(np.sqrt(np.sum(each) / windows)),
+            nrmse_torque=None,
+            chi2_per_dof=1.0,
         )
 
     def places(self, sigma: np.ndarray) -> list[Place]:
@@ -259,7 +272,7 @@ def judge_records(
         causes=causes,
         steps=steps,
         remainder=ledger.remainder(best.model, refit.model),
-        gap=Gaps(**gaps, noise_floor=None),
+        gap=Gaps(**gaps, noise_floor=ledger.noise()),
         gap_closed=_closed(ledger, refit.model, best.model) if causes else None,
         where=ledger.places_of_error(refit.model),
         ranking=_ranking(fitter, found),

@@ -24,7 +24,8 @@ from gap_diagnosis.outcome.diagnosis import (
     Gaps,
     Verdict,
 )
-from gap_diagnosis.which.search_space import catalogue, starts
+from gap_diagnosis.which.catalogue import catalogue
+from gap_diagnosis.which.search_space import starts
 
 from .baseline_fit import Problem, fit, jacobian
 

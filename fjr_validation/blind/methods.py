@@ -10,7 +10,7 @@ from typing import Any
 
 from fjr_kit.errors import InputError
 from fjr_sim_node.plant import PLANT
-from gap_diagnosis.investigation import diagnose
+from gap_diagnosis.any_record import diagnose
 from gap_diagnosis.outcome.diagnosis import Diagnosis
 
 from .baselines import BASELINES

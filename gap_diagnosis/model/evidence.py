@@ -101,6 +101,11 @@ class Evidence:
         """Return the indices of the parts for some purposes."""
         return tuple(i for i, part in enumerate(self.parts) if part.purpose in purposes)
 
+    @property
+    def reporting(self) -> tuple[int, ...]:
+        """The parts that all figures are computed on; the others where none reports."""
+        return self.parts_for("report") or self.parts_for("select", "fit")
+
     def errors(self, models: Sequence[Model], which: Sequence[int]) -> np.ndarray:
         """Return the errors of models on parts, float64 (models, errors), rad.
 

@@ -13,10 +13,11 @@ from fjr_sim_node import effects as fx
 
 from ..model.misfit import Misfit
 from ..model.simulated_rig import Model, Simulator
+from .catalogue import catalogue
 from .least_squares import Solution, solve
 from .ripples import RippleSearch
 from .screening import Proposal, Screening
-from .search_space import TOLERANCE, Scales, Space, catalogue, space_for, starts
+from .search_space import TOLERANCE, Scales, Space, space_for, starts
 
 _KEPT_STARTS = 2
 _MOST_STEPS = 40
@@ -66,6 +67,7 @@ class Fitter:
         tolerance: how far a datasheet value may be off, relative.
         train, held: misfit of the realizations to fit, and of those to judge by.
         scales: what is usual in the record, the measures of starts and bounds.
+        catalogue: effects to look for.
     """
 
     def __init__(
@@ -77,6 +79,7 @@ class Fitter:
         train: Sequence[int],
         held: Sequence[int],
         tolerance: float = TOLERANCE,
+        effects: Sequence[str] | None = None,
     ) -> None:
         """Prepare.
 
@@ -88,7 +91,9 @@ class Fitter:
             train: realizations to fit.
             held: realizations to judge by.
             tolerance: how far a datasheet value may be off, relative.
+            effects: identifiers to look for; None for all.
         """
+        self.catalogue = catalogue(nominal, effects)
         self.recorded, self._simulator = recorded, simulator
         self._levels = [realization.level for realization in recorded.realizations]
         self._misfit = lambda which: Misfit(recorded, simulator, noise_std, which)
@@ -97,11 +102,6 @@ class Fitter:
         self.train = Misfit(recorded, simulator, noise_std, train)
         self.held = Misfit(recorded, simulator, noise_std, held)
         self.scales = Scales.of_experiment(recorded, self.nominal)
-
-    @property
-    def catalogue(self) -> list[str]:
-        """Effects that this rig can have."""
-        return catalogue(self.nominal)
 
     def refit(self) -> Fit:
         """Fit the base parameters alone, level after level added from the lowest amplitude up.

@@ -48,8 +48,9 @@ def with_rounding(
     others = [replace(f, held_chi2=f.held_chi2 + more) for f in attribution.candidates]
     rest = [fit for fit in others if fit.effects != (ROUNDING,)]
     return Attribution(
-        replace(refit, train_chi2=train, held_chi2=held), (found, *rest), found, (), True
-    )
+        replace(refit, train_chi2=train, held_chi2=held), (found, *rest), found, (), True,
+        attribution.complete,
+    )  # fmt: skip
 
 
 def _rounded(refit: Fit, step: float) -> Fit:

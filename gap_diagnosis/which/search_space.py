@@ -30,7 +30,7 @@ _LEAST_LINK = 0.4  # of its inertia that a third mass leaves it at a start
 _COARSE_CYCLES = 11
 
 
-def catalogue(nominal: Mapping[str, float]) -> list[str]:
+def possible_effects(nominal: Mapping[str, float]) -> list[str]:
     """Return the effects that a rig with these nominal parameters can have and a fit can find."""
     return [e.identifier for e in fx.CATALOGUE if e.starts and _free(e, nominal)]
 

@@ -100,7 +100,7 @@ def test_answers_are_what_was_committed_to(unsealed):
 
 def test_verdicts_carry_diagnosis_and_time(unsealed):
     for values in unsealed.read_verdicts().values():
-        assert values["diagnosis"]["schema"] == "fjr_rig/diagnosis/1"
+        assert values["diagnosis"]["schema"] == "fjr_rig/diagnosis/2"
         assert values["seconds"] > 0.0
 
 

@@ -19,11 +19,12 @@ from gap_diagnosis.gates.gate_checks import check_gates
 from gap_diagnosis.model.misfit import Misfit
 from gap_diagnosis.model.prediction import crossover_hz, lead, observer
 from gap_diagnosis.model.simulated_rig import Model, Simulator
-from gap_diagnosis.report.gap_output import simulator_values
+from gap_diagnosis.report.updated_parameters import simulator_values
+from gap_diagnosis.which.catalogue import catalogue
 from gap_diagnosis.which.fits import Fitter
 from gap_diagnosis.which.least_squares import solve
 from gap_diagnosis.which.search import Search
-from gap_diagnosis.which.search_space import Scales, Space, catalogue, starts
+from gap_diagnosis.which.search_space import Scales, Space, starts
 
 NOMINAL = PLANT.defaults()
 LEAD_WITH_INTEGRATOR = {
