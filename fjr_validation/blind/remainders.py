@@ -11,7 +11,7 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.signal import lfilter
 
-from .causes import Draw, Drawer, Scales, linear
+from .draw import Draw, Drawer, Scales, linear
 from .rigs import log_uniform
 
 SCATTER = (0.01, 0.05)
@@ -72,9 +72,7 @@ def laws(*, rigid: bool) -> tuple[Drawer, ...]:
     return _ANY_AXIS if rigid else (*_ANY_AXIS, _bending)
 
 
-def wandering(
-    rng: np.random.Generator, samples: int, rate_hz: float, time_s: float
-) -> np.ndarray:
+def wandering(rng: np.random.Generator, samples: int, rate_hz: float, time_s: float) -> np.ndarray:
     """Return an Ornstein-Uhlenbeck signal of unit variance and a correlation time, (samples,)."""
     kept = np.exp(-1.0 / (rate_hz * time_s))
     white = np.sqrt(1.0 - kept**2) * rng.standard_normal(samples)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from .causes import Scales
+from .draw import Scales
 from .excitations import Excitation, Run, draw_multisine, draw_records
 from .remainders import scattered, wandering
 from .rigs import Rig, draw_rig, log_uniform
