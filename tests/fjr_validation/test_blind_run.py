@@ -53,8 +53,8 @@ def fill(check: BlindCheck, names: list[str]) -> None:
     for name in names:
         answer = {**truth, "world": name.split("_")[0]}
         JsonLines(check.folder / "sealed.jsonl").append(sealed_line(name, answer, key))
-        line = {"case": name, "method": "refit", "seconds": 1.0,
-                "diagnosis": {"verdict": "parameters_only", "effects": [], "confidence": 0.9}}  # fmt: skip
+        diagnosis = {"verdict": "parameters_only", "effects": [], "confidence": 0.9}
+        line = {"case": name, "method": "refit", "seconds": 1.0, "diagnosis": diagnosis}
         JsonLines(check.folder / "verdicts.jsonl").append(line)
 
 

@@ -30,8 +30,13 @@ def answer(world: World, kind: Kind, causes: tuple[Cause, ...] = (), weak: tuple
     )  # fmt: skip
 
 
-def said(*named: str, present: float = 0.95, sets: dict[str, list[str]] | None = None,
-         parameters: dict[str, Any] | None = None, doubted: tuple[str, ...] = ()) -> dict[str, Any]:  # fmt: skip
+def said(
+    *named: str,
+    present: float = 0.95,
+    sets: dict[str, list[str]] | None = None,
+    parameters: dict[str, Any] | None = None,
+    doubted: tuple[str, ...] = (),
+) -> dict[str, Any]:
     """Return what is kept of a diagnosis of schema 2."""
     causes = [
         {"effect": name, "or": (sets or {}).get(name, []), "present": present,
@@ -171,8 +176,13 @@ def test_a_drift_is_found_by_its_verdict_and_not_a_wrong_name_elsewhere():
 
 def test_schema_1_is_read_as_claims_as_sure_as_the_verdict():
     estimates = {SIZE: {"value": 1.0, "low": 0.9, "high": 1.1}, "jm": {"value": 1.0}}
-    old = {"verdict": "ambiguous", "effects": ["backlash"], "confidence": 0.9,
-           "equivalent": [["backlash", "piecewise_stiffness"]], "parameters": estimates}  # fmt: skip
+    old = {
+        "verdict": "ambiguous",
+        "effects": ["backlash"],
+        "confidence": 0.9,
+        "equivalent": [["backlash", "piecewise_stiffness"]],
+        "parameters": estimates,
+    }
     (claim,) = claims(old)
     assert claim.present == 0.9 and claim.named
     assert claim.names == {"backlash", "piecewise_stiffness"}

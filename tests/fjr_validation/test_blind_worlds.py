@@ -4,6 +4,7 @@ import json
 import math
 from collections import Counter
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fjr_records import open_experiment
+from fjr_sim_node.effects import EFFECTS
 from fjr_validation.blind import excitations, rigs, stage
 from fjr_validation.blind.answers import WORLDS, Answer
 from fjr_validation.blind.causes import FAMILIES, compatible, drawers
@@ -19,7 +21,6 @@ from fjr_validation.blind.remainders import laws, scattered, wandering
 from fjr_validation.blind.second_laws import SETTINGS
 from fjr_validation.blind.visibility import FLOORS, Visibility, size_showing
 from fjr_validation.blind.worlds import KINDS, kind_of, make_case
-from fjr_sim_node.effects import EFFECTS
 from gap_diagnosis.model.nominal import read_nominal
 
 SEEDS = st.integers(0, 2**31 - 1)
@@ -76,7 +77,7 @@ def test_an_excitation_has_levels_runs_and_lengths_within_its_ranges(seed):
     seconds = drawn.runs[0].reference.size / rig.loop.sample_rate_hz
     assert 9.9 <= seconds <= 30.1
     rms = [float(np.std(run.reference)) for run in drawn.firsts]
-    assert all(1.4 < b / a < 3.3 for a, b in zip(rms, rms[1:], strict=False))
+    assert all(1.4 < b / a < 3.3 for a, b in pairwise(rms))
     assert rms[-1] < 1.1 * excitations.LARGEST_RAD[1]
     assert (drawn.kind == "multisine") is periodic
     if not periodic:

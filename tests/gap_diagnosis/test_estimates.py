@@ -9,8 +9,7 @@ import pytest
 from gap_cases import SHORT, fitter_of, simulate_case
 
 from gap_diagnosis.model.simulated_rig import Model
-from gap_diagnosis.outcome.diagnosis import Diagnosis, Estimate, Gaps
-from gap_diagnosis.which.estimates import WIDENING, estimates, standard_errors, sure
+from gap_diagnosis.which.estimates import estimates, standard_errors, sure
 from gap_diagnosis.which.fits import Fit
 from gap_diagnosis.which.least_squares import Solution
 from gap_diagnosis.which.search_space import Space
