@@ -45,8 +45,11 @@ def _torque_bias(rng: np.random.Generator, at: Scales) -> Draw:
                   same_as={"bias_nm": "torque_nm"})  # fmt: skip
 
 
-def _presliding(_: np.random.Generator, at: Scales) -> Draw:
-    return linear("presliding_friction", {"presliding_motor_rad": at.angle}, 0.01, 0.3)
+def _presliding(rng: np.random.Generator, at: Scales) -> Draw:
+    scaled = {"presliding_motor_rad": at.angle}
+    if math.isfinite(at.resonance_hz) and rng.random() < 0.5:
+        scaled["presliding_link_rad"] = at.angle * log_uniform(rng, 0.5, 2.0)
+    return linear("presliding_friction", scaled, 0.01, 0.3)
 
 
 def _lugre(rng: np.random.Generator, at: Scales) -> Draw:
@@ -66,8 +69,9 @@ def _load(_: np.random.Generator, __: Scales) -> Draw:
 def _directional(rng: np.random.Generator, _: Scales) -> Draw:
     ways = [1.0, float(rng.uniform(0.0, 0.4))]
     forward, backward = ways if rng.random() < 0.5 else ways[::-1]
-    return linear("directional_loss", {"loss_forward": forward, "loss_backward": backward}, 0.05,
-                  0.4)  # fmt: skip
+    scaled = {"loss_forward": forward, "loss_backward": backward}
+    same = {"loss_forward": "forward", "loss_backward": "backward"}
+    return linear("directional_loss", scaled, 0.05, 0.4, same_as=same)
 
 
 def _ripple(name: str, stem: str, unit: str, start: float, most: float,
@@ -102,7 +106,8 @@ def _piecewise(rng: np.random.Generator, at: Scales) -> Draw:
 
 
 def _asymmetric_stiffness(rng: np.random.Generator, _: Scales) -> Draw:
-    return linear("asymmetric_stiffness", {"stiffness_asymmetry": sign(rng)}, 0.05, 0.4)
+    return linear("asymmetric_stiffness", {"stiffness_asymmetry": sign(rng)}, 0.05, 0.4,
+                  same_as={"stiffness_asymmetry": "relative"})  # fmt: skip
 
 
 def _hysteresis(rng: np.random.Generator, at: Scales) -> Draw:
@@ -145,19 +150,29 @@ def _saturation(_: np.random.Generator, at: Scales) -> Draw:
 
 def _speed_limit(rng: np.random.Generator, at: Scales) -> Draw:
     stall = at.torque_peak * rng.uniform(1.2, 1.8)
+    same = {"stall_nm": "stall_nm", "no_load_rad_s": "no_load_rad_s"}
     return Draw(
         "torque_speed_limit",
-        lambda size: {"stall_nm": stall, "no_load_rad_s": at.speed_peak / size}, 0.5, 0.95,
-    )  # fmt: skip
+        lambda size: {"stall_nm": stall, "no_load_rad_s": at.speed_peak / size},
+        0.5,
+        0.95,
+        {ours: f"torque_speed_limit.{theirs}" for ours, theirs in same.items()},
+    )
 
 
 def _slew(_: np.random.Generator, at: Scales) -> Draw:
-    return Draw("torque_slew_limit", lambda size: {"slew_nm_s": at.torque_rate_peak / size}, 1.0,
-                20.0)  # fmt: skip
+    return Draw(
+        "torque_slew_limit",
+        lambda size: {"slew_nm_s": at.torque_rate_peak / size},
+        1.0,
+        20.0,
+        {"slew_nm_s": "torque_slew_limit.limit_nm_s"},
+    )
 
 
 def _dead_band(_: np.random.Generator, at: Scales) -> Draw:
-    return linear("dead_band", {"deadband_nm": at.torque}, 0.03, 0.3)
+    return linear("dead_band", {"deadband_nm": at.torque}, 0.03, 0.3,
+                  same_as={"deadband_nm": "width_nm"})  # fmt: skip
 
 
 def _quantization(_: np.random.Generator, at: Scales) -> Draw:
@@ -175,18 +190,21 @@ def _drift(rng: np.random.Generator, _: Scales) -> Draw:
                   {"drift_time_s": log_uniform(rng, 15.0, 60.0)})  # fmt: skip
 
 
-def _lacking(name: str, value: str, unit: Callable[[Scales], float], most: float) -> Drawer:
+def _lacking(
+    name: str, value: str, unit: Callable[[Scales], float], most: float, parameter: str
+) -> Drawer:
     def draw(_: np.random.Generator, at: Scales) -> Draw:
         factor = unit(at)
         names = (value,) if math.isfinite(at.resonance_hz) else (value, value[:2])
-        return Draw(name, lambda size: {value: factor * size}, 0.1 * most, most, {}, names)
+        same = {value: f"{name}.{parameter}"}
+        return Draw(name, lambda size: {value: factor * size}, 0.1 * most, most, same, names)
 
     return draw
 
 
 _FRICTION: tuple[Drawer, ...] = (
-    _lacking("coulomb_friction", "fsm", lambda at: at.torque, 0.5),
-    _lacking("viscous_friction", "fvm", lambda at: at.torque / at.speed, 0.5),
+    _lacking("coulomb_friction", "fsm", lambda at: at.torque, 0.5, "motor_nm"),
+    _lacking("viscous_friction", "fvm", lambda at: at.torque / at.speed, 0.5, "motor_nm_s_rad"),
 )
 
 _ANY_AXIS: tuple[Drawer, ...] = (
@@ -227,8 +245,8 @@ _FLEXIBLE: tuple[Drawer, ...] = (
 def drawers(*, rigid: bool, stationary: bool) -> tuple[Drawer, ...]:
     """Return the drawers of causes that a rig can have.
 
-    A gain of the torque is never one: it is exactly a scale of all parameters. A drift is one only
-    where friction does not scatter anyway.
+    A gain of the torque is never one: it is exactly a scale of all parameters. Nor is a stiffness
+    that the datasheet lacks. A drift is one only where friction does not scatter anyway.
     """
     flexible = () if rigid else _FLEXIBLE
     return (*_FRICTION, *_ANY_AXIS, *flexible, *(() if stationary else (_drift,)))

@@ -76,8 +76,14 @@ def _intervals(effect: str, estimates: Mapping[str, Any]) -> dict[str, Interval]
         full = name if "." in name else f"{effect}.{name}"
         if not full.startswith(f"{effect}.") or not isinstance(estimate, Mapping):
             continue
-        numbers = [estimate.get(part) for part in ("value", "low", "high")]
-        if all(isinstance(n, (int, float)) and math.isfinite(n) for n in numbers):
-            value, low, high = (float(n) for n in numbers)
+        value, low, high = (_finite(estimate.get(part)) for part in ("value", "low", "high"))
+        if value is not None and low is not None and high is not None:
             found[full] = (value, low, high)
     return found
+
+
+def _finite(number: Any) -> float | None:
+    """Return a finite number; None for anything else, such as an end at infinity."""
+    if isinstance(number, (int, float)) and math.isfinite(number):
+        return float(number)
+    return None

@@ -99,7 +99,7 @@ def test_causes_are_those_of_the_catalogue_and_laws_of_the_remainder_are_not():
     every = {draw(rng, SCALES).name for draw in drawers(rigid=False, stationary=False)}
     for _ in range(30):
         every |= {draw(rng, SCALES).name for draw in drawers(rigid=False, stationary=False)}
-    assert every == (set(EFFECTS) | NEW) - {"torque_gain"}
+    assert every == (set(EFFECTS) | NEW) - {"torque_gain", "transmission_stiffness"}
     outside = {draw(rng, SCALES).name for draw in laws(rigid=False)}
     assert not outside & (set(EFFECTS) | NEW | EARLIER)
     assert {name for family in FAMILIES for name in family} <= every
