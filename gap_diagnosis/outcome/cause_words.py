@@ -28,6 +28,7 @@ EXCITATION: dict[str, str] = {
     "record": "The records were compared as they came, in windows.",
 }
 _MOST_DIGITS = 6
+_AS_NOISE = 1.5  # times what noise leaves: a remainder no greater than that has no look of its own
 
 
 def evidence_sentences(evidence: EvidenceKind) -> list[str]:
@@ -46,6 +47,10 @@ def remainder_sentences(diagnosis: Diagnosis) -> list[str]:
     if left is None:
         return []
     said = []
+    floor = diagnosis.gap.noise_floor
+    noise = None if floor is None else floor.nrmse_position
+    if left.nrmse_position is not None and noise and left.nrmse_position < _AS_NOISE * noise:
+        return [f"{percent(left.nrmse_position)} of the motion remains, which noise explains."]
     if left.nrmse_position is not None:
         share = "" if left.share is None else f", {percent(left.share)} of the refit's squared gap"
         said.append(f"{percent(left.nrmse_position)} of the motion remains{share}.")

@@ -99,7 +99,7 @@ def waterfall_plot(diagnosis: Diagnosis) -> Plot | None:
             "base": numbers(start),
             "x": numbers([high - low for low, high in zip(start, end, strict=True)]),
             "text": [bar.label for _, bar in chosen],
-            "textposition": "outside", "cliponaxis": False, "width": 0.62,
+            "textposition": "outside", "cliponaxis": False, "width": 0.62, "showlegend": False,
             "marker": {"color": color},
             "hovertemplate": "%{text}<extra>%{fullData.name}</extra>",
         })  # fmt: skip
@@ -115,7 +115,7 @@ def waterfall_plot(diagnosis: Diagnosis) -> Plot | None:
         "range": [len(shown) - 0.4, -0.6],
         "showgrid": False,
     }
-    return {"data": traces, "layout": axes | {"showlegend": False}}
+    return {"data": traces, "layout": axes}
 
 
 def height(diagnosis: Diagnosis) -> int:
