@@ -1,8 +1,9 @@
-"""Excitation: odd random-phase multisines, spectrum shaping, and the node that streams them.
+"""Excitation: odd random-phase multisines, records, spectrum shaping, and the node that streams.
 
 Parameters go in, an experiment description and the samples of its reference come out. Begin with
-`multisine` (grid of lines, phases, signal; paper eq. 13); `shaping` is the paper's algorithm 1;
-`node` streams the reference ahead of the lockstep.
+`multisine` (grid of lines, phases, signal; paper eq. 13); `records` makes chirps, noise, moves and
+steps, which do not repeat, `record_experiment` describes them; `shaping` is the paper's algorithm
+1; `node` streams the multisine ahead of the lockstep.
 
     >>> from excitation_node import EXCITATION, describe, reference
     >>> values = EXCITATION.check({"amplitudes_rad": [0.007], "periods": 2, "transient_periods": 1})

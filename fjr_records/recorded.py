@@ -13,7 +13,8 @@ from fjr_interface.experiment import Experiment
 from fjr_interface.resampling.accuracy import Resampling
 from fjr_kit.errors import InputError
 
-from .experiment_folder import ExperimentBag, Override, open_experiment
+from .experiment_bag import ExperimentBag, Override
+from .experiment_folder import open_experiment
 from .records import reference_optional
 from .spectra import line_spectrum
 

@@ -18,7 +18,7 @@ from .record_judgement import FEWEST_PARTS, Tested, judge_records, tested_causes
 from .which.catalogue import catalogue
 from .which.cell_fits import CellFitter
 from .which.search_space import TOLERANCE
-from .which.stepwise import TIED_SHARE, TIED_T, Found, Stepwise, gain
+from .which.stepwise import Found, Stepwise, gain, stands_for
 
 Progress = Callable[[str], None]
 
@@ -135,7 +135,8 @@ def _kept(fitter: CellFitter, found: Found, progress: Progress) -> tuple[Found, 
         before = [fit for fit in steps if weakest.effect not in fit.effects]
         last = weakest.without
         steps = before if last.effects == before[-1].effects else [*before, last]
-        if last.effects == before[-1].effects and last.scores.mean() > before[-1].scores.mean():
+        same = last.effects == before[-1].effects
+        if same and fitter.gains(last, before[-1]).sum() > 0.0:
             steps[-1] = last
         tested = []
     return replace(found, steps=steps), tested
@@ -153,22 +154,19 @@ def _alternatives(
         other = fitter.add(tested.without, effect, proposals) if proposals else None
         if other is None:
             continue
-        behind = gain(best, other)
-        if behind.mean < TIED_SHARE * tested.gain.mean or (
-            behind.t < TIED_T and behind.mean < 0.5 * tested.gain.mean
-        ):
+        if stands_for(gain(fitter, best, other), tested.gain.mean):
             tied.append(effect)
     return tied
 
 
 def _notes(evidence: Evidence, found: Found) -> list[str]:
-    notes = []
+    notes = list(evidence.simulator.loop.notes)
     if not evidence.noise.known:
         notes.append(
             "The noise of the position is not known: no repeats, no standstill, and the highest "
             "lines are not flat; so nothing is said of significance."
         )
-    if evidence.simulator.loop == "unknown":
+    if evidence.simulator.loop.kind == "unknown":
         notes.append(
             "The loop is not known, so the recorded torque drives the model and an observer of "
             f"{evidence.simulator.crossover_hz:.3g} Hz holds it to the recorded position: below "

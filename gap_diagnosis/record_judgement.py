@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import norm
 
 from .model.evidence import Evidence
 from .model.simulated_rig import Model
@@ -30,6 +29,7 @@ from .where.remainder import looks_like
 from .which.cell_fits import CellFit, CellFitter
 from .which.presence import (
     LEAST_INVARIANCE_P,
+    at_its_bound,
     beyond_zero,
     cell_estimates,
     invariance,
@@ -41,7 +41,7 @@ NOTHING_LEFT = 2.0
 """Mean squared error over noise below which noise explains what is left."""
 PLAIN = 4.0
 """The same for the refit where no effect gains anything."""
-FEWEST_PARTS = 3
+FEWEST_PARTS = 6
 """Parts that select, below which the evidence is too thin for any name."""
 _DRAWS = 1000
 _MOST_PLACES = 4
@@ -61,7 +61,7 @@ class Tested:
         gain: what leaving it out loses on unseen parts.
         without: the fit that lacks it.
         invariance_p: see `invariance`; None with one level.
-        certain: whether the interval of its size lacks zero.
+        certain: whether the interval of its size lacks zero, and no parameter is at its bound.
     """
 
     effect: str
@@ -79,7 +79,7 @@ class Tested:
     @property
     def present(self) -> float:
         """Probability that it is there."""
-        sure = float(norm.cdf(0.5 * (self.gain.t - 2.0))) * min(1.0, self.gain.share + 0.1)
+        sure = (1.0 - min(1.0, 5.0 * self.gain.p)) * min(1.0, self.gain.share + 0.1)
         if not self.certain:
             sure *= 0.5
         if self.invariance_p is not None and self.invariance_p < LEAST_INVARIANCE_P:
@@ -96,10 +96,10 @@ def tested_causes(fitter: CellFitter, fit: CellFit, groups: np.ndarray) -> list[
         found.append(
             Tested(
                 effect,
-                gain(fit, without),
+                gain(fitter, fit, without),
                 without,
                 invariance(fitter, fit, effect),
-                beyond_zero(effect, estimates),
+                beyond_zero(effect, estimates) and not at_its_bound(fit, effect),
             )
         )
     return found
@@ -266,7 +266,7 @@ def judge_records(
         evidence=EvidenceKind(
             noise=evidence.noise.source,
             reported_on=_reported_on(evidence),
-            controller="known" if evidence.simulator.loop == "known" else "unknown",
+            controller=evidence.simulator.loop.kind,
             excitation="record",
         ),
         causes=causes,
@@ -275,7 +275,7 @@ def judge_records(
         gap=Gaps(**gaps, noise_floor=ledger.noise()),
         gap_closed=_closed(ledger, refit.model, best.model) if causes else None,
         where=ledger.places_of_error(refit.model),
-        ranking=_ranking(found),
+        ranking=_ranking(fitter, found),
         parameters=estimates,
         notes=[*([THIN] if thin else []), *notes],
     )
@@ -332,7 +332,7 @@ def _verdict(
     return "unexplained"
 
 
-def _ranking(found: Found) -> list[Candidate]:
+def _ranking(fitter: CellFitter, found: Found) -> list[Candidate]:
     ranked = []
     for count, fits in found.rivals.items():
         parent = found.steps[min(count, len(found.steps)) - 1]
@@ -342,7 +342,7 @@ def _ranking(found: Found) -> list[Candidate]:
                 Candidate(
                     effects=list(fit.effects),
                     held_out_chi2=None,
-                    delta=gain(fit, parent).mean,
+                    delta=gain(fitter, fit, parent).mean,
                     converged=fit.solution.converged,
                     parameters={
                         n: {"value": fit.model.effects[n], "low": math.nan, "high": math.nan}

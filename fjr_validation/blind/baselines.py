@@ -24,6 +24,7 @@ from gap_diagnosis.outcome.diagnosis import (
     Gaps,
     Verdict,
 )
+from gap_diagnosis.which.catalogue import catalogue
 from gap_diagnosis.which.search_space import starts
 
 from .baseline_fit import Problem, fit, jacobian
@@ -91,12 +92,10 @@ def _projected(basis: np.ndarray, vector: np.ndarray) -> np.ndarray:
 def _features(refit: _Refit, basis: np.ndarray) -> list[tuple[str, dict[str, float], np.ndarray]]:
     """Return (effect, values, change of the residual beyond any refit) of every starting point."""
     found = []
-    for entry in fx.CATALOGUE:
-        if not entry.starts:
-            continue
-        effect = entry.identifier
-        cycles = _CYCLES if entry.ripple else None
-        for point in starts(effect, refit.problem.peak_torque_nm, cycles):
+    nominal = refit.problem.nominal
+    for effect in catalogue(nominal):
+        cycles = _CYCLES if fx.EFFECTS[effect].ripple else None
+        for point in starts(effect, refit.problem.scales, cycles, nominal):
             residual = refit.problem.residual({**refit.values, **point})
             if np.isfinite(residual).all():
                 found.append((effect, point, _projected(basis, residual - refit.residual)))

@@ -14,7 +14,15 @@ an effect, this is the other one:
     torque saturation       rounded
     actuator lag            two stages
     delay                   of the measurement
+    LuGre                   Maxwell slip under a Stribeck level
+    directional loss        friction by the transmitted torque, by the sign of the power
+    torque-speed limit      hard clamp on a line that falls with the speed
     drift                   exponential warm-up
+
+The remainder of the open worlds has laws of its own, in no catalogue: Eyring (shear-thinning)
+drag, eddy-current drag, a cable (Maxwell arm to the ground), a one-sided cushion, a torque constant
+that falls as the winding heats, loss in bending that grows with its square, interpolation error of
+the encoder, a torque that wanders, jitter of the encoder's stamp.
 """
 
 from __future__ import annotations
@@ -38,20 +46,25 @@ SETTINGS: tuple[str, ...] = (
     "cogging_nm", "cogging_cycles", "cogging_phase_rad",
     "delay_s", "lag_s", "limit_nm", "gain_error", "resolution_rad",
     "eccentricity_rad", "eccentricity_phase_rad", "drift_relative", "drift_time_s",
-    "absorber_kg_m2", "absorber_nm_rad3", "hum_nm", "hum_hz",
-    "memory_relative", "memory_time_s", "slew_nm_s", "angle_stiffness_relative",
-    "angle_stiffness_cycles", "deadband_nm", "stiffness_asymmetry",
-    "inertia_variation", "inertia_cycles", "ripple_relative", "ripple_cycles",
+    "slew_nm_s", "deadband_nm", "stiffness_asymmetry",
+    "ripple_relative", "ripple_cycles", "ripple_phase_rad",
+    "loss_forward", "loss_backward", "stall_nm", "no_load_rad_s",
+    "eyring_nm", "eyring_rad_s", "eddy_nm", "eddy_rad_s",
+    "cable_nm_rad", "cable_time_s", "cushion_nm_rad2", "cushion_rad",
+    "heating_relative", "heating_nm", "heating_time_s", "bending_nm_s_rad", "bending_rad",
+    "interpolation_rad", "interpolation_cycles", "wander_nm", "jitter_s",
 )  # fmt: skip
-"""Settings, zero if off; from absorber_kg_m2 on they are outside any catalogue."""
+"""Settings, zero if off; from eyring_nm on they are outside any catalogue."""
 
 (
     STRIBECK_M, STRIBECK_MV, STRIBECK_L, STRIBECK_LV, ASYM_C, ASYM_V, BIAS, GMS_M, GMS_L, LOAD,
     FRICTION_ANGLE, FRICTION_CYCLES, FRICTION_PHASE, DRAG_M, DRAG_L, GAP, ZONE, SOFT,
     HYST, HYST_RAD, FLEX_DAMPING, KIN, KIN_CYCLES, KIN_PHASE, MODE, MODE_HZ, MODE_DAMPING,
     GRAVITY, GRAVITY_ANGLE, COG, COG_CYCLES, COG_PHASE, DELAY, LAG, LIMIT, GAIN, RESOLUTION,
-    ECC, ECC_PHASE, DRIFT, DRIFT_TIME, ABSORBER, ABSORBER_K, HUM, HUM_HZ, MEMORY, MEMORY_TIME,
-    SLEW, ANGLE_K, ANGLE_K_CYCLES, DEADBAND, K_ASYM, INERTIA, INERTIA_CYCLES, RIPPLE, RIPPLE_CYCLES,
+    ECC, ECC_PHASE, DRIFT, DRIFT_TIME, SLEW, DEADBAND, K_ASYM, RIPPLE, RIPPLE_CYCLES, RIPPLE_PHASE,
+    LOSS_FORWARD, LOSS_BACKWARD, STALL, NO_LOAD, EYRING, EYRING_V, EDDY, EDDY_V,
+    CABLE, CABLE_TIME, CUSHION, CUSHION_RAD, HEATING, HEATING_NM, HEATING_TIME, BENDING,
+    BENDING_RAD, INTERPOLATION, INTERPOLATION_CYCLES, WANDER, JITTER,
 ) = range(len(SETTINGS))  # fmt: skip
 
 PLANT_NAMES = ("jm", "j", "fs", "fsm", "fv", "fvm", "k0", "k1")
@@ -95,11 +108,9 @@ def rounded_beyond(d, zone):
 
 
 @part
-def elastic(d, th, p, s):
+def elastic(d, p, s):
     """Return the elastic torque (N m) at a deflection d (rad) outside any gap."""
     k = p[K0]
-    if s[ANGLE_K] != 0.0:
-        k *= 1.0 + s[ANGLE_K] * math.sin(s[ANGLE_K_CYCLES] * th + 0.7)
     if s[K_ASYM] != 0.0:
         k *= 1.0 + s[K_ASYM] if d > 0.0 else 1.0 - s[K_ASYM]
     linear = d
@@ -156,3 +167,39 @@ def drive(u, s):
     if s[LIMIT] != 0.0:
         u /= (1.0 + abs(u / s[LIMIT]) ** 16) ** 0.0625
     return u * (1.0 + s[GAIN])
+
+
+@part
+def within_speed_limit(torque, speed, s):
+    """Return a torque (N m) within what the supply voltage leaves at a speed (rad/s)."""
+    if s[STALL] == 0.0:
+        return torque
+    ratio = speed / s[NO_LOAD]
+    return min(max(torque, -s[STALL] * (1.0 + ratio)), s[STALL] * (1.0 - ratio))
+
+
+@part
+def drag(speed, s):
+    """Return torque over speed (N m s/rad) of the drags that are in no catalogue, at |speed|."""
+    total = 0.0
+    if s[EYRING] != 0.0:
+        ratio = speed / s[EYRING_V]
+        total += s[EYRING] * (math.asinh(ratio) / speed if ratio > 1e-6 else 1.0 / s[EYRING_V])
+    if s[EDDY] != 0.0:
+        ratio = speed / s[EDDY_V]
+        total += 2.0 * s[EDDY] / s[EDDY_V] / (1.0 + ratio * ratio)
+    return total
+
+
+@part
+def outer_load(angle, cable, wander, s):
+    """Return the torque (N m) on the output from outside: gravity, cable, cushion, wandering."""
+    torque = s[WANDER] * wander
+    if s[GRAVITY] != 0.0:
+        across = math.cos(s[GRAVITY_ANGLE]) * math.sin(angle)
+        torque -= s[GRAVITY] * (across + math.sin(s[GRAVITY_ANGLE]) * math.cos(angle))
+    if s[CABLE] != 0.0:
+        torque -= s[CABLE] * (angle - cable)
+    if s[CUSHION] != 0.0 and angle > s[CUSHION_RAD]:
+        torque -= s[CUSHION] * (angle - s[CUSHION_RAD]) ** 2
+    return torque

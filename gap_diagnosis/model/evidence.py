@@ -29,7 +29,9 @@ WINDOWS = 24
 _LONGEST_WINDOW_S = 4.0
 _WINDOWS_PER_BLOCK = 2
 _PURPOSES: tuple[Purpose, ...] = ("fit", "select", "report")
-_CYCLE: tuple[Purpose, ...] = ("fit", "select", "fit", "report")  # of the blocks of one record
+_CYCLE: tuple[Purpose, ...] = ("fit", "select", "fit", "report")
+"""Purposes of the blocks of a level's only record, shifted from level to level: what one time of
+the record shows serves all purposes."""
 _SIMULATION = 1e-3  # error of the simulation itself, relative to the rms of a cell
 _DIVERGED = 1e6
 
@@ -134,6 +136,12 @@ class Evidence:
         ]
         return np.concatenate(pieces)
 
+    def changes(self, positions: dict[int, np.ndarray], which: Sequence[int]) -> np.ndarray:
+        """Return the lines of changes of y on parts, (errors,), by the index of the record."""
+        lines = {i: lapped(change, self.hop)[:, : self.lines] for i, change in positions.items()}
+        pieces = [lines[self.parts[i].record][self.parts[i].windows].ravel() for i in which]
+        return np.concatenate(pieces)
+
     def cell_of(self, which: Sequence[int]) -> np.ndarray:
         """Return the cell of each error on parts, int (errors,)."""
         return np.concatenate(
@@ -182,7 +190,7 @@ def _parts(records: RecordSet, hop: int) -> list[Part]:
     selects and reports, block by block; a single one serves all three.
     """
     parts = []
-    for level in records.levels:
+    for number, level in enumerate(records.levels):
         members = [i for i, r in enumerate(records.records) if r.level == level]
         members.sort(key=lambda i: -float(np.abs(records.records[i].torque).max()))
         for place, index in enumerate(members):
@@ -190,7 +198,7 @@ def _parts(records: RecordSet, hop: int) -> list[Part]:
             blocks = max(count // _WINDOWS_PER_BLOCK, 1)
             ends = np.linspace(0, count, blocks + 1).astype(int)
             for block in range(blocks):
-                purpose = _purpose(len(members), place, block)
+                purpose = _purpose(len(members), place, block + number)
                 parts.append(
                     Part(index, level, slice(int(ends[block]), int(ends[block + 1])), purpose)
                 )

@@ -7,20 +7,18 @@ drives the model, and an observer holds its motion to the recorded position (`pr
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal
 
 import numpy as np
 
-from controller_node.transfer_function import Law, TransferFunction, law_of
+from controller_node.transfer_function import TransferFunction
 from fjr_kit.errors import InputError
 from fjr_records.record_noise import RecordNoise
 from fjr_records.records import Record, RecordSet
-from fjr_sim_node.simulation.closed_loop import Trajectory, simulate, simulate_law
+from fjr_sim_node.simulation.closed_loop import Trajectory, simulate_law
 
 from .prediction import CROSSOVER_SHARE, lead
+from .record_loop import RecordLoop, loop_of
 from .simulated_rig import Model, run_parallel
-
-Loop = Literal["known", "unknown"]
 
 _AT_REST = 5.0  # standard deviations of noise that a record at rest may begin away from zero
 _FIRST_SAMPLES = 10
@@ -32,8 +30,8 @@ class RecordSimulator:
 
     Attributes:
         records: what is played.
-        loop: whether the loop is simulated, or the torque drives the model.
-        crossover_hz: crossover of the observer; None where the loop is known.
+        loop: how the loop is known.
+        crossover_hz: crossover of the observer.
     """
 
     def __init__(self, records: RecordSet, noise: RecordNoise, top_hz: float) -> None:
@@ -49,14 +47,21 @@ class RecordSimulator:
         """
         self.records = records
         self._rate = records.sample_rate_hz
-        known = all(r.reference is not None and r.controller for r in records.records)
-        self.loop: Loop = "known" if known else "unknown"
+        self.loop: RecordLoop = loop_of(records)
         self._starts = [_start(r, noise) for r in records.records]
-        crossover_hz = CROSSOVER_SHARE * top_hz
-        self.crossover_hz: float | None = None if known else crossover_hz
-        self._observer = _observer(records, crossover_hz)
-        if known:
-            self._laws = [law_of(r.controller, self._rate) for r in records.records]
+        self.crossover_hz = CROSSOVER_SHARE * top_hz
+        self._observer = _observer(records, self.crossover_hz)
+        self._entries = [
+            law.entering_state(r.reference, r.position, r.torque)
+            if start != (0.0, 0.0) and r.reference is not None
+            else None
+            for law, r, start in zip(self.loop.laws, records.records, self._starts, strict=False)
+        ]
+
+    def response(self, frequency_hz: np.ndarray, index: int) -> np.ndarray:
+        """Return C_y of what holds a run: its controller, or the observer; complex, N m/rad."""
+        law = self._observer if self.loop.kind == "unknown" else self.loop.laws[index]
+        return law.response(frequency_hz, self._rate)[1]
 
     def run(self, models: Sequence[Model], which: Sequence[int]) -> list[list[np.ndarray]]:
         """Return y, u and q of each model in each run.
@@ -105,22 +110,18 @@ class RecordSimulator:
         return np.array([run.position, run.torque, run.motor if model.rigid else run.link])
 
     def _simulated(self, model: Model, index: int) -> Trajectory:
-        if self.loop == "unknown":
+        if self.loop.kind == "unknown":
             return self._observed(model, index)
         record, (p, e) = self.records.records[index], _coefficients(model)
-        law, start = self._laws[index], self._starts[index]
         assert record.reference is not None
-        if start == (0.0, 0.0):
-            return simulate(record.reference, self._rate, p, law, None, e)
-        return simulate_law(record.reference, self._rate, p, _general(law), None, e, start=start)
+        return simulate_law(
+            record.reference, self._rate, p, self.loop.laws[index], None, e,
+            start=self._starts[index], controller_state=self._entries[index],
+        )  # fmt: skip
 
 
 def _coefficients(model: Model) -> tuple[tuple[float, ...], tuple[float, ...] | None]:
     return model.plant_coefficients, model.effect_coefficients
-
-
-def _general(law: Law) -> TransferFunction:
-    return law if isinstance(law, TransferFunction) else TransferFunction.of_pd(law)
 
 
 def _start(record: Record, noise: RecordNoise) -> tuple[float, float]:

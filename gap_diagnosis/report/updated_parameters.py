@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -10,6 +12,7 @@ from controller_node.pd_filtered import from_description
 from fjr_interface.experiment import Experiment
 from fjr_records.recorded import RecordedExperiment
 from fjr_records.records import RecordSet
+from fjr_sim_node import effects, plant
 from fjr_sim_node.simulation.simulator import SIMULATOR
 
 from ..outcome.diagnosis import Diagnosis
@@ -25,7 +28,7 @@ def updated_values(
     the record, so that a campaign plays the same kind of signal, with phases of its own.
     """
     rate = _rate(recorded)
-    simulator = {name: float(e.value) for name, e in diagnosis.parameters.items()}
+    simulator = simulator_values({name: float(e.value) for name, e in diagnosis.parameters.items()})
     SIMULATOR.check(simulator, "updated.yaml")
     values: dict[str, dict[str, Any]] = {"simulator": {"sample_rate_hz": rate, **simulator}}
     if isinstance(recorded, RecordedExperiment):
@@ -33,6 +36,20 @@ def updated_values(
     if has_known_law(recorded):
         values["controller"] = from_description(_controller(recorded) or {}, rate)
     return values
+
+
+def simulator_values(found: Mapping[str, float]) -> dict[str, float]:
+    """Return the simulator's parameters from those of a diagnosis.
+
+    What the bare plant lacked is in its own parameters then. A rigid axis is one body, whose
+    inertia and friction are the motor's.
+    """
+    light = plant.PLANT["j"].low
+    rigid = {"j": light, "fs": 0.0, "fv": 0.0, "k0": math.inf, "k1": 0.0}
+    own = plant.with_added({**(rigid if "k0" not in found else {}), **found})
+    added = [e for e in effects.CATALOGUE if e.of_bare_plant]
+    gone = {*plant.PLANT.names, *(name for effect in added for name in effect.names)}
+    return {**own, **{name: value for name, value in found.items() if name not in gone}}
 
 
 def has_known_law(recorded: RecordedExperiment | RecordSet) -> bool:

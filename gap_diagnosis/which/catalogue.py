@@ -7,11 +7,13 @@ from collections.abc import Mapping, Sequence
 from fjr_kit.errors import InputError
 from fjr_sim_node import effects as fx
 
+from .search_space import possible_effects
+
 
 def catalogue(nominal: Mapping[str, float], asked: Sequence[str] | None = None) -> list[str]:
     """Return the effects that a rig can have, or those of them that were asked for.
 
-    A rigid axis has none of transmission and link.
+    A rigid axis has none of transmission and link, and friction is added only where there is none.
 
     Args:
         nominal: datasheet values of the base parameters.
@@ -25,14 +27,7 @@ def catalogue(nominal: Mapping[str, float], asked: Sequence[str] | None = None) 
             raise InputError(
                 f"effects: {name} is no effect; the effects are {', '.join(fx.EFFECTS)}."
             )
-    rigid = "k0" not in nominal
-    found = [
-        effect.identifier
-        for effect in fx.CATALOGUE
-        if effect.starts
-        and (effect.on_rigid_axis or not rigid)
-        and (asked is None or effect.identifier in asked)
-    ]
+    found = [e for e in possible_effects(nominal) if asked is None or e in asked]
     if asked is not None and not found:
         raise InputError(
             f"effects: none of {', '.join(asked) or 'the named effects'} can be fitted to this "

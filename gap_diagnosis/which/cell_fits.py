@@ -14,9 +14,13 @@ from functools import partial
 
 import numpy as np
 
+from fjr_sim_node import effects as fx
+
 from ..model.evidence import Evidence
 from ..model.simulated_rig import Model
 from .least_squares import Solution, solve
+from .ripples_of_records import RecordRipples
+from .scales import Scales
 from .screening import Proposal, Screening
 from .search_space import Space, space_for, starts
 
@@ -24,6 +28,7 @@ _REFIT_ROUNDS = (8, 5, 5)
 _ADDED_ROUNDS = (6, 4)
 _NO_PROMISE = 0.998  # of the parent's cost: a start that gains less is not pursued
 _STARTS = 2
+RIPPLES_TRIED = 3
 _RIVAL = 1.05  # a second start that costs more than this times the first is not pursued
 
 
@@ -37,7 +42,8 @@ class CellFit:
         model: the fitted model.
         solution: the optimiser's end, its residuals in standard deviations of `variance`.
         variance: (cells,), of an error in each cell, rad2.
-        scores: (parts,), log-likelihood per number of the parts that select, by their order.
+        left: (parts, bands), mean square of what is left on each part that selects, noise and the
+            simulation's own error added, rad2.
     """
 
     effects: tuple[str, ...]
@@ -45,7 +51,7 @@ class CellFit:
     model: Model
     solution: Solution
     variance: np.ndarray
-    scores: np.ndarray
+    left: np.ndarray
 
 
 class CellFitter:
@@ -63,24 +69,44 @@ class CellFitter:
         self.evidence, self.nominal, self.tolerance = evidence, dict(nominal), tolerance
         self.fit_parts = evidence.parts_for("fit")
         self.select_parts = evidence.parts_for("select") or self.fit_parts
+        self._rippled: tuple[CellFit, RecordRipples] | None = None
         self._cell = evidence.cell_of(self.fit_parts)
         self._floor = evidence.floor(self.fit_parts)
         self.groups = evidence.part_of(self.fit_parts)
-        self._peak = max(float(np.abs(r.torque).max()) for r in evidence.records.records)
+        evidence = self.evidence
+        bands = evidence.cell_of(self.select_parts) % evidence.bands
+        place = {part: k for k, part in enumerate(self.select_parts)}
+        of_part = np.array([place[p] for p in evidence.part_of(self.select_parts)])
+        self._select_bins = of_part * evidence.bands + bands
+        shape = len(self.select_parts), evidence.bands
+        self._counts = np.bincount(self._select_bins, minlength=shape[0] * shape[1]).reshape(shape)
+        levels = [evidence.records.levels.index(evidence.parts[p].level) for p in self.select_parts]
+        self._select_floor = self._floor.reshape(-1, evidence.bands)[levels]
+        records = evidence.records
+        self.scales = Scales.of_record(
+            [r.position for r in records.records],
+            [r.torque for r in records.records],
+            records.sample_rate_hz,
+            evidence.lines * evidence.line_hz,
+            self.nominal,
+        )
 
     def refit(self) -> CellFit:
         """Fit the base parameters alone, from the datasheet."""
-        space = Space(self.nominal, (), (), self.tolerance)
+        space = Space(self.nominal, (), (), self.tolerance, self.scales)
         start = space.point(Model(self.nominal, {}))
         errors = self.evidence.errors([space.model(start)], self.fit_parts)[0]
         return self._reweighted((), space, start, self._variance(errors), _REFIT_ROUNDS)
 
     def screening(self, parent: CellFit, effect: str) -> Screening:
         """Return what the starts of an effect promise beside a fit."""
+        cycles = None
+        if fx.EFFECTS[effect].ripple:
+            cycles = self._ripples(parent).cycles(effect, self.scales.cycles(), RIPPLES_TRIED)
         return Screening(
             parent.solution,
             parent.model,
-            starts(effect, self._peak),
+            starts(effect, self.scales, cycles, self.nominal),
             partial(self._space, parent),
             partial(self._residuals, parent.variance),
         )
@@ -101,7 +127,7 @@ class CellFitter:
             fit = self._reweighted(
                 (*parent.effects, effect), space, point, parent.variance, _ADDED_ROUNDS, known
             )
-            if best is None or fit.scores.mean() > best.scores.mean():
+            if best is None or self.gains(fit, best).sum() > 0.0:
                 best = fit
         return best
 
@@ -116,18 +142,36 @@ class CellFitter:
         rest = tuple(e for e in fit.effects if e != effect)
         return self._reweighted(rest, space, start, fit.variance, _ADDED_ROUNDS)
 
-    def score(self, model: Model, variance: np.ndarray, parts: Sequence[int]) -> np.ndarray:
-        """Return the log-likelihood per number of each part, (parts,)."""
-        evidence = self.evidence
-        errors = evidence.errors([model], parts)[0]
-        v = variance[evidence.cell_of(parts)]
-        each = -0.5 * (np.log(v) + errors**2 / v)
-        place = {part: k for k, part in enumerate(parts)}
-        part = np.array([place[p] for p in evidence.part_of(parts)])
-        return np.bincount(part, each) / np.bincount(part)
+    def gains(self, after: CellFit, before: CellFit) -> np.ndarray:
+        """Return the log-likelihood that one fit gains over another on each part that selects.
+
+        With the variance of each band of each part unknown it is n/2 ln(left before/left after),
+        summed over bands of n numbers: no part counts by its size, and no outlier by its square.
+
+        Returns:
+            (parts,), nats.
+        """
+        counts = self._counts
+        return 0.5 * np.sum(counts * np.log(before.left / after.left), axis=1)
+
+    def _left(self, model: Model) -> np.ndarray:
+        parts = self.select_parts
+        errors = self.evidence.errors([model], parts)[0]
+        bins = self._select_bins
+        squares = np.bincount(bins, errors**2, len(parts) * self.evidence.bands)
+        mean = squares.reshape(len(parts), -1) / self._counts
+        return mean + self._select_floor
+
+    def _ripples(self, parent: CellFit) -> RecordRipples:
+        if self._rippled is None or self._rippled[0] is not parent:
+            weight = 1.0 / np.sqrt(parent.variance[self._cell])
+            solution = parent.solution
+            ripples = RecordRipples(self.evidence, self.fit_parts, parent.model, weight, solution)
+            self._rippled = parent, ripples
+        return self._rippled[1]
 
     def _space(self, parent: CellFit, seed: Mapping[str, float]) -> Space:
-        added = space_for(self.nominal, seed)
+        added = space_for(self.nominal, seed, self.scales, self.tolerance)
         return replace(
             parent.space,
             effects=parent.space.effects + added.effects,
@@ -169,5 +213,4 @@ class CellFitter:
             cost=float(np.sum(errors**2 / variance[self._cell])),
         )
         model = space.model(x)
-        scores = self.score(model, variance, self.select_parts)
-        return CellFit(effects, space, model, ended, variance, scores)
+        return CellFit(effects, space, model, ended, variance, self._left(model))

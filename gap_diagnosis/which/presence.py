@@ -22,6 +22,7 @@ from .estimates import standard_errors
 LEAST_INVARIANCE_P = 0.01
 _SAME = 0.05  # relative: sizes that differ by no more are the same, since friction scatters
 _NORMAL_95 = 1.96
+_AT_BOUND = 1e-3  # relative
 
 
 def cell_estimates(fit: CellFit, groups: np.ndarray) -> dict[str, Estimate]:
@@ -54,6 +55,23 @@ def beyond_zero(effect: str, found: dict[str, Estimate]) -> bool:
         estimate, off = found[name], float(fx.parameter(name).default)
         if math.isinf(off) or not estimate.low <= off <= estimate.high:
             return True
+    return False
+
+
+def at_its_bound(fit: CellFit, effect: str) -> bool:
+    """Tell whether a parameter of an effect lies where the fit may go no further.
+
+    Zero and one are no such bounds: they are what a ratio or a share can be.
+    """
+    low, high = fit.space.bounds()
+    for k, name in enumerate(fit.space.effects, len(fit.space.nominal)):
+        if not name.startswith(f"{effect}.") or fx.parameter(name).role == "angle":
+            continue
+        unit = fit.space.units[k - len(fit.space.nominal)]
+        for end in (low[k], high[k]):
+            near = abs(fit.solution.x[k] - end) <= _AT_BOUND * max(abs(end), _AT_BOUND)
+            if near and end * unit not in (0.0, 1.0):
+                return True
     return False
 
 

@@ -16,7 +16,6 @@ from ..model.misfit import Misfit
 from ..outcome.verdict_words import ROUNDING
 from .attribution import CERTAIN, SMALL_GAIN, Attribution
 from .fits import Fit
-from .search_space import Space
 
 
 def widened(noise_std: np.ndarray, step: float, samples: int) -> np.ndarray:
@@ -62,7 +61,7 @@ def _rounded(refit: Fit, step: float) -> Fit:
         refit,
         effects=(ROUNDING,),
         model=refit.model.with_effects({name: step}),
-        space=Space(space.nominal, (name,), (step,), space.tolerance),
+        space=replace(space, effects=(name,), units=(step,)),
         solution=replace(
             solution,
             x=np.append(solution.x, 1.0),

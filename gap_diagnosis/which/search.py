@@ -292,9 +292,13 @@ class Search:
                 self._fits[effects] = self._fitter.continued(fit)
 
     def _tied(self, best: Fit) -> tuple[Fit, ...]:
-        """Return the converged explanations of as many effects that do as well as the best."""
+        """Return the converged explanations of as many effects that do as well as the best.
+
+        One that only contains the best is no rival.
+        """
         if not best.effects:
             return ()
         limit = tie_limit(self.misfit(best), self._fitter.held.size)
-        others = [f for f in self._sure(len(best.effects)) if f.effects != best.effects]
-        return tuple(fit for fit in others if self.misfit(fit) < limit)
+        rivals = [fit for fit in self._sure(len(best.effects)) if self.misfit(fit) < limit]
+        own = best.effects
+        return tuple(f for f in rivals if f.effects != own and not fx.contains(f.effects, own))

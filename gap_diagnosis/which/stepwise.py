@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy import stats
 
 from fjr_sim_node import effects as fx
 
@@ -18,11 +19,19 @@ from .cell_fits import CellFit, CellFitter
 
 MOST_CAUSES = 4
 _PROPOSED, _FITTED = 6, 4
-LEAST_T = 3.0
-LEAST_SHARE = 0.8
-LEAST_GAIN = 0.01
-TIED_T = 2.0
+LEAST_GAIN = 1.0
+"""Least mean gain of log-likelihood of an unseen part (nats)."""
+LEAST_SHARE = 0.75
+"""Least share of the parts in which anything changes that must gain."""
+MOST_P = 0.02
+"""Greatest p-value of the signed-rank test that parts gain as often and as much as they lose."""
 TIED_SHARE = 0.15
+"""An effect stands for another if it is behind by less than this share of the other's gain..."""
+TIED_P = 0.1
+"""...or by less than half of it and unseen parts do not show the difference."""
+
+_MUCH_LESS = 0.3  # of the greatest gain: a cause that gains less waits for the next step
+_NEUTRAL = 0.02  # of the greatest gain of a part: parts that change by less say nothing
 
 Progress = Callable[[str], None]
 
@@ -32,29 +41,37 @@ class Gain:
     """What one explanation gains over another on unseen parts.
 
     Attributes:
-        mean: mean over parts of the log-likelihood gained per number.
-        t: mean over its standard error.
-        share: share of parts that gain.
+        mean: mean over unseen parts of the log-likelihood gained (nats).
+        without_best: the same without the part that gains most.
+        share: share of parts that gain, of those in which anything changes.
+        p: p-value of Wilcoxon's signed-rank test against no gain.
     """
 
     mean: float
-    t: float
+    without_best: float
     share: float
+    p: float
 
     @property
     def present(self) -> bool:
-        """Whether it repeats."""
-        return self.mean > LEAST_GAIN and self.t > LEAST_T and self.share >= LEAST_SHARE
+        """Whether it repeats, and is not the sum by one part."""
+        repeats = self.share >= LEAST_SHARE and self.p <= MOST_P
+        return min(self.mean, 3.0 * self.without_best) > LEAST_GAIN and repeats
 
 
-def gain(after: CellFit, before: CellFit) -> Gain:
+def gain(fitter: CellFitter, after: CellFit, before: CellFit) -> Gain:
     """Return what `after` gains over `before` on the parts that select."""
-    difference = after.scores - before.scores
-    count = difference.size
-    error = float(difference.std(ddof=1) / np.sqrt(count)) if count > 1 else float("inf")
-    mean = float(difference.mean())
-    t = mean / error if error > 0.0 else float("inf")
-    return Gain(mean, t, float(np.mean(difference > 0.0)))
+    difference = fitter.gains(after, before)
+    if difference.size < 2 or not difference.any():
+        return Gain(float(difference.mean()), 0.0, 0.0, 1.0)
+    most = int(np.argmax(difference))
+    telling = difference[np.abs(difference) >= _NEUTRAL * np.abs(difference).max()]
+    return Gain(
+        float(difference.mean()),
+        float(np.delete(difference, most).mean()),
+        float(np.mean(telling > 0.0)),
+        float(stats.wilcoxon(difference, alternative="greater").pvalue),
+    )
 
 
 @dataclass
@@ -71,7 +88,6 @@ class Found:
     steps: list[CellFit]
     rivals: dict[int, list[CellFit]] = field(default_factory=dict)
     alternatives: dict[str, list[str]] = field(default_factory=dict)
-    gains: dict[str, Gain] = field(default_factory=dict)
     complete: bool = True
 
     @property
@@ -110,11 +126,11 @@ class Stepwise:
                 break
             fits = self._extended(found.best)
             found.rivals[len(found.best.effects) + 1] = fits
-            if not fits or not gain(fits[0], found.best).present:
+            chosen = self._chosen(fits, found.best)
+            if chosen is None:
                 break
-            found.gains[fits[0].effects[-1]] = gain(fits[0], found.best)
-            found.alternatives[fits[0].effects[-1]] = _tied(fits, found.best)
-            found.steps.append(fits[0])
+            found.alternatives[chosen.effects[-1]] = self._tied(chosen, fits, found.best)
+            found.steps.append(chosen)
         return found
 
     @property
@@ -142,15 +158,43 @@ class Stepwise:
             fit = self._fitter.add(parent, effect, proposals[effect])
             if fit is not None:
                 fits.append(fit)
-        return sorted(fits, key=lambda fit: -float(fit.scores.mean()))
+        return sorted(fits, key=lambda fit: -self._gain(fit, parent).mean)
+
+    def _gain(self, after: CellFit, before: CellFit) -> Gain:
+        return gain(self._fitter, after, before)
+
+    def _chosen(self, fits: Sequence[CellFit], parent: CellFit) -> CellFit | None:
+        """Return the best fit whose gain repeats, unless another one gains much more.
+
+        Of those that unseen parts cannot tell from it, the one with the fewest parameters.
+        """
+        gains = [self._gain(fit, parent) for fit in fits]
+        repeating = [
+            fit
+            for fit, found in zip(fits, gains, strict=True)
+            if found.present and found.mean > _MUCH_LESS * gains[0].mean
+        ]
+        if not repeating:
+            return None
+        first = repeating[0]
+        worth = self._gain(first, parent).mean
+        alike = [f for f in repeating if f is first or stands_for(self._gain(first, f), worth)]
+        return min(alike, key=lambda fit: len(fit.space.effects))
+
+    def _tied(self, chosen: CellFit, fits: Sequence[CellFit], parent: CellFit) -> list[str]:
+        """Return the effects that unseen parts cannot tell from the chosen one."""
+        first = self._gain(chosen, parent).mean
+        others = [fit for fit in fits if fit is not chosen]
+        return [f.effects[-1] for f in others if stands_for(self._gain(chosen, f), first)]
 
 
-def _tied(fits: Sequence[CellFit], parent: CellFit) -> list[str]:
-    """Return the effects that unseen parts cannot tell from the first one."""
-    first = gain(fits[0], parent).mean
-    tied = []
-    for fit in fits[1:]:
-        behind = gain(fits[0], fit)
-        if behind.mean < TIED_SHARE * first or behind.t < TIED_T:
-            tied.append(fit.effects[-1])
-    return tied
+def stands_for(behind: Gain, first: float) -> bool:
+    """Tell whether unseen parts cannot tell an explanation from a better one.
+
+    Args:
+        behind: what the better one gains over it.
+        first: mean gain of the better one's cause.
+    """
+    if behind.mean < TIED_SHARE * first:
+        return True
+    return behind.p > TIED_P and behind.mean < 0.5 * first

@@ -57,8 +57,8 @@ PAIR = ("backlash", "torque_bias")
         ("two", [LAG, GAP], "effect", ("backlash",), None, False),
         ("two", [GAP, COULOMB], "ambiguous", PAIR, [[PAIR[0]], [PAIR[1], "gravity"]], True),
         ("two", [GAP, LAG], "ambiguous", PAIR, [[PAIR[0]], [PAIR[1], "gravity"]], False),
-        ("outside", [effect("drive_dead_band")], "unexplained", (), None, True),
-        ("outside", [effect("drive_dead_band")], "effect", ("backlash",), None, False),
+        ("outside", [effect("frictional_memory")], "unexplained", (), None, True),
+        ("outside", [effect("frictional_memory")], "effect", ("backlash",), None, False),
         ("nonstationary", [effect("nonstationary")], "nonstationary", (), None, True),
         ("nonstationary", [effect("nonstationary")], "unexplained", (), None, False),
     ],
@@ -128,7 +128,7 @@ def test_one_name_does_not_stand_for_two_effects():
 
 
 def test_false_alarms_and_confident_names_are_counted_apart_from_abstention():
-    dead = [effect("drive_dead_band")]
+    dead = [effect("frictional_memory")]
     cases = [
         outcome("none", [], "effect", ("delay",)),
         outcome("parameters", [], "parameters_only"),

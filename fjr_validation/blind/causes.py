@@ -1,0 +1,331 @@
+"""Causes of a gap: effects of the catalogue as the second plant has them, drawn for a rig.
+
+Each draw fixes the shape of an effect at random and leaves one number free, its size, which is
+relative to what the rig does (its rms torque, speed, angle, deflection). Where a setting of the
+second plant means the same as a parameter of the catalogue, that is said, so that intervals can be
+checked; where the two plants have other laws, nothing is.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .rigs import log_uniform
+
+Settings = dict[str, float]
+
+
+@dataclass(frozen=True)
+class Scales:
+    """What a rig does at its highest level: the measures of sizes, SI units, rms unless said."""
+
+    torque: float
+    torque_peak: float
+    torque_rate_peak: float
+    speed: float
+    speed_peak: float
+    angle: float
+    deflection: float
+    coulomb: float  # level on the motor
+    damping: float  # 2 sqrt(k J_eff), N m s/rad; critical damping of the resonance
+    link_inertia: float
+    resonance_hz: float
+    band_hz: float
+    crossover_hz: float
+
+
+@dataclass(frozen=True)
+class Draw:
+    """An effect with its shape drawn and its size free.
+
+    Attributes:
+        name: identifier of the catalogue, or a name of ours outside it.
+        settings: returns settings of the second plant, or values of its bare plant, for a size.
+        start: a size to start searches from.
+        most: greatest size that makes sense.
+        same_as: catalogue parameter by setting, where both mean the same.
+        lacking: values of the bare plant that the datasheet then lacks.
+    """
+
+    name: str
+    settings: Callable[[float], Settings]
+    start: float
+    most: float
+    same_as: Mapping[str, str] = field(default_factory=dict)
+    lacking: tuple[str, ...] = ()
+
+    def truth(self, settings: Mapping[str, float]) -> Settings:
+        """Return the true values of the catalogue's parameters, as far as both mean the same."""
+        return {self.same_as[name]: value for name, value in settings.items()
+                if name in self.same_as}  # fmt: skip
+
+
+Drawer = Callable[[np.random.Generator, Scales], Draw]
+
+
+def linear(
+    name: str, scaled: Settings, start: float, most: float, shape: Settings | None = None,
+    same_as: Mapping[str, str] | None = None,
+) -> Draw:  # fmt: skip
+    """Return a draw whose settings are proportional to its size, beside a shape."""
+    fixed = shape or {}
+
+    def settings(size: float) -> Settings:
+        return fixed | {setting: factor * size for setting, factor in scaled.items()}
+
+    full = {ours: f"{name}.{theirs}" for ours, theirs in (same_as or {}).items()}
+    return Draw(name, settings, start, most, full)
+
+
+def sign(rng: np.random.Generator) -> float:
+    """Return -1 or 1."""
+    return float(rng.choice([-1.0, 1.0]))
+
+
+def phase(rng: np.random.Generator) -> float:
+    """Return an angle in (-pi, pi)."""
+    return float(rng.uniform(-np.pi, np.pi))
+
+
+def _cycles(rng: np.random.Generator, at: Scales) -> float:
+    """Return whole cycles per turn of which the motion sees from one to some."""
+    return float(np.clip(round(log_uniform(rng, 1.0 / at.angle, 20.0 / at.angle)), 2, 400))
+
+
+def _stribeck(side: str, letters: str) -> Drawer:
+    def draw(rng: np.random.Generator, at: Scales) -> Draw:
+        shape = {f"stribeck_{letters}_rad_s": at.speed * log_uniform(rng, 0.1, 0.5)}
+        scaled = {f"stribeck_{letters}_nm": at.torque}
+        return linear(f"stribeck_friction_{side}", scaled, 0.05, 1.0, shape)
+
+    return draw
+
+
+def _asymmetric(rng: np.random.Generator, at: Scales) -> Draw:
+    if rng.random() < 0.5:
+        scaled = {"asymmetric_viscous_nm_s_rad": sign(rng) * at.torque / at.speed}
+        return linear("asymmetric_friction", scaled, 0.02, 0.3,
+                      same_as={"asymmetric_viscous_nm_s_rad": "viscous_nm_s_rad"})  # fmt: skip
+    return linear("asymmetric_friction", {"asymmetric_coulomb_nm": sign(rng) * at.coulomb}, 0.2,
+                  0.9, same_as={"asymmetric_coulomb_nm": "coulomb_nm"})  # fmt: skip
+
+
+def _torque_bias(rng: np.random.Generator, at: Scales) -> Draw:
+    return linear("torque_bias", {"bias_nm": sign(rng) * at.torque}, 0.05, 0.5,
+                  same_as={"bias_nm": "torque_nm"})  # fmt: skip
+
+
+def _presliding(_: np.random.Generator, at: Scales) -> Draw:
+    return linear("presliding_friction", {"presliding_motor_rad": at.angle}, 0.01, 0.3)
+
+
+def _lugre(rng: np.random.Generator, at: Scales) -> Draw:
+    scaled = {
+        "presliding_motor_rad": 0.2 * at.angle * log_uniform(rng, 0.1, 1.0),
+        "stribeck_motor_nm": at.coulomb * log_uniform(rng, 0.5, 1.5),
+    }
+    shape = {"stribeck_motor_rad_s": at.speed * log_uniform(rng, 0.1, 0.5)}
+    return linear("lugre_friction", scaled, 0.1, 1.0, shape)
+
+
+def _load(_: np.random.Generator, __: Scales) -> Draw:
+    return linear("load_friction", {"load_coefficient": 1.0}, 0.03, 0.4,
+                  same_as={"load_coefficient": "coefficient"})  # fmt: skip
+
+
+def _directional(rng: np.random.Generator, _: Scales) -> Draw:
+    ways = [1.0, float(rng.uniform(0.0, 0.4))]
+    forward, backward = ways if rng.random() < 0.5 else ways[::-1]
+    return linear("directional_loss", {"loss_forward": forward, "loss_backward": backward}, 0.05,
+                  0.4)  # fmt: skip
+
+
+def _ripple(name: str, stem: str, unit: str, start: float, most: float,
+            unit_of: Callable[[Scales], float]) -> Drawer:  # fmt: skip
+    def draw(rng: np.random.Generator, at: Scales) -> Draw:
+        cycles = _cycles(rng, at)
+        shape = {f"{stem}_cycles": cycles, f"{stem}_phase_rad": phase(rng)}
+        steepest = 0.2 / (cycles * unit_of(at)) if unit == "rad" else most
+        return linear(name, {f"{stem}_{unit}": unit_of(at)}, min(start, 0.1 * steepest),
+                      min(most, steepest), shape,
+                      same_as={f"{stem}_cycles": "cycles_per_turn"})  # fmt: skip
+
+    return draw
+
+
+def _drag(rng: np.random.Generator, at: Scales) -> Draw:
+    link = math.isfinite(at.resonance_hz) and rng.random() < 0.5
+    side = "link" if link else "motor"
+    return linear("quadratic_friction", {f"drag_{side}_nm_s2_rad2": at.torque / at.speed**2}, 0.03,
+                  0.5, same_as={f"drag_{side}_nm_s2_rad2": f"{side}_nm_s2_rad2"})  # fmt: skip
+
+
+def _backlash(_: np.random.Generator, at: Scales) -> Draw:
+    return linear("backlash", {"half_gap_rad": at.deflection}, 0.1, 2.0,
+                  same_as={"half_gap_rad": "half_gap_rad"})  # fmt: skip
+
+
+def _piecewise(rng: np.random.Generator, at: Scales) -> Draw:
+    shape = {"soft_ratio": float(rng.uniform(0.3, 0.7))}
+    return linear("piecewise_stiffness", {"soft_zone_rad": at.deflection}, 0.3, 2.0, shape,
+                  same_as={"soft_zone_rad": "zone_rad", "soft_ratio": "soft_ratio"})  # fmt: skip
+
+
+def _asymmetric_stiffness(rng: np.random.Generator, _: Scales) -> Draw:
+    return linear("asymmetric_stiffness", {"stiffness_asymmetry": sign(rng)}, 0.05, 0.4)
+
+
+def _hysteresis(rng: np.random.Generator, at: Scales) -> Draw:
+    return linear("hysteresis", {"hysteresis_nm": at.torque}, 0.03, 0.5,
+                  {"hysteresis_rad": at.deflection * log_uniform(rng, 0.1, 1.0)})  # fmt: skip
+
+
+def _transmission_damping(_: np.random.Generator, at: Scales) -> Draw:
+    return linear("transmission_damping", {"flex_damping_nm_s_rad": at.damping}, 0.02, 0.4,
+                  same_as={"flex_damping_nm_s_rad": "nm_s_rad"})  # fmt: skip
+
+
+def _extra_mode(rng: np.random.Generator, at: Scales) -> Draw:
+    hertz = min(at.resonance_hz * log_uniform(rng, 0.6, 1.8), 0.85 * at.band_hz)
+    shape = {"mode_hz": hertz, "mode_damping_ratio": log_uniform(rng, 0.01, 0.05)}
+    same = {"mode_kg_m2": "inertia_kg_m2", "mode_hz": "frequency_hz",
+            "mode_damping_ratio": "damping_ratio"}  # fmt: skip
+    return linear("extra_mode", {"mode_kg_m2": at.link_inertia}, 0.02, 0.3, shape, same)
+
+
+def _gravity(rng: np.random.Generator, at: Scales) -> Draw:
+    return linear("gravity", {"gravity_nm": at.torque}, 0.1, 1.0,
+                  {"gravity_angle_rad": phase(rng)},
+                  {"gravity_nm": "torque_nm", "gravity_angle_rad": "angle_rad"})  # fmt: skip
+
+
+def _delay(_: np.random.Generator, at: Scales) -> Draw:
+    return linear("delay", {"delay_s": 1.0 / at.crossover_hz}, 2e-3, 0.06,
+                  same_as={"delay_s": "time_s"})  # fmt: skip
+
+
+def _lag(_: np.random.Generator, at: Scales) -> Draw:
+    return linear("actuator_lag", {"lag_s": 1.0 / at.crossover_hz}, 2e-3, 0.06)
+
+
+def _saturation(_: np.random.Generator, at: Scales) -> Draw:
+    return Draw("torque_saturation", lambda size: {"limit_nm": at.torque_peak * (1.2 - size)}, 0.3,
+                0.75)  # fmt: skip
+
+
+def _speed_limit(rng: np.random.Generator, at: Scales) -> Draw:
+    stall = at.torque_peak * rng.uniform(1.2, 1.8)
+    return Draw(
+        "torque_speed_limit",
+        lambda size: {"stall_nm": stall, "no_load_rad_s": at.speed_peak / size}, 0.5, 0.95,
+    )  # fmt: skip
+
+
+def _slew(_: np.random.Generator, at: Scales) -> Draw:
+    return Draw("torque_slew_limit", lambda size: {"slew_nm_s": at.torque_rate_peak / size}, 1.0,
+                20.0)  # fmt: skip
+
+
+def _dead_band(_: np.random.Generator, at: Scales) -> Draw:
+    return linear("dead_band", {"deadband_nm": at.torque}, 0.03, 0.3)
+
+
+def _quantization(_: np.random.Generator, at: Scales) -> Draw:
+    return linear("encoder_quantization", {"resolution_rad": at.angle}, 5e-3, 0.1,
+                  same_as={"resolution_rad": "resolution_rad"})  # fmt: skip
+
+
+def _eccentricity(rng: np.random.Generator, _: Scales) -> Draw:
+    return linear("encoder_eccentricity", {"eccentricity_rad": 1.0}, 0.02, 0.2,
+                  {"eccentricity_phase_rad": phase(rng)})  # fmt: skip
+
+
+def _drift(rng: np.random.Generator, _: Scales) -> Draw:
+    return linear("nonstationary", {"drift_relative": sign(rng)}, 0.1, 0.6,
+                  {"drift_time_s": log_uniform(rng, 15.0, 60.0)})  # fmt: skip
+
+
+def _lacking(name: str, value: str, unit: Callable[[Scales], float], most: float) -> Drawer:
+    def draw(_: np.random.Generator, at: Scales) -> Draw:
+        factor = unit(at)
+        names = (value,) if math.isfinite(at.resonance_hz) else (value, value[:2])
+        return Draw(name, lambda size: {value: factor * size}, 0.1 * most, most, {}, names)
+
+    return draw
+
+
+_FRICTION: tuple[Drawer, ...] = (
+    _lacking("coulomb_friction", "fsm", lambda at: at.torque, 0.5),
+    _lacking("viscous_friction", "fvm", lambda at: at.torque / at.speed, 0.5),
+)
+
+_ANY_AXIS: tuple[Drawer, ...] = (
+    _stribeck("motor", "motor"),
+    _asymmetric,
+    _torque_bias,
+    _presliding,
+    _lugre,
+    _ripple("position_friction", "friction_angle", "nm", 0.2, 0.9, lambda at: at.coulomb),
+    _drag,
+    _gravity,
+    _ripple("cogging", "cogging", "nm", 0.03, 0.5, lambda at: at.torque),
+    _delay,
+    _lag,
+    _saturation,
+    _speed_limit,
+    _slew,
+    _dead_band,
+    _ripple("torque_constant_ripple", "ripple", "relative", 0.05, 0.5, lambda _: 1.0),
+    _quantization,
+    _eccentricity,
+)
+
+_FLEXIBLE: tuple[Drawer, ...] = (
+    _stribeck("link", "link"),
+    _load,
+    _directional,
+    _backlash,
+    _piecewise,
+    _asymmetric_stiffness,
+    _hysteresis,
+    _transmission_damping,
+    _ripple("kinematic_error", "kinematic", "rad", 0.02, 0.4, lambda at: at.deflection),
+    _extra_mode,
+)
+
+
+def drawers(*, rigid: bool, stationary: bool) -> tuple[Drawer, ...]:
+    """Return the drawers of causes that a rig can have.
+
+    A gain of the torque is never one: it is exactly a scale of all parameters. A drift is one only
+    where friction does not scatter anyway.
+    """
+    flexible = () if rigid else _FLEXIBLE
+    return (*_FRICTION, *_ANY_AXIS, *flexible, *(() if stationary else (_drift,)))
+
+
+FAMILIES: tuple[frozenset[str], ...] = tuple(
+    frozenset(names)
+    for names in (
+        ("asymmetric_friction", "torque_bias", "gravity"),
+        ("backlash", "piecewise_stiffness", "asymmetric_stiffness"),
+        ("delay", "actuator_lag", "torque_slew_limit"),
+        ("position_friction", "cogging", "torque_constant_ripple", "kinematic_error"),
+        ("hysteresis", "transmission_damping", "directional_loss", "load_friction"),
+        ("presliding_friction", "lugre_friction", "stribeck_friction_motor",
+         "stribeck_friction_link", "coulomb_friction"),
+        ("torque_saturation", "torque_speed_limit"),
+    )
+)  # fmt: skip
+"""Effects that are near each other: two of one family are never put into one case."""
+
+
+def compatible(names: list[str], name: str) -> bool:
+    """Tell whether a further cause differs from all others and is near none of them."""
+    return name not in names and not any(
+        name in family and other in family for family in FAMILIES for other in names
+    )
