@@ -28,6 +28,7 @@ EXCITATION: dict[str, str] = {
     "record": "The records were compared as they came, in windows.",
 }
 _MOST_DIGITS = 6
+_AS_NOISE = 1.5  # times what noise leaves: a remainder no greater than that has no look of its own
 
 
 def evidence_sentences(evidence: EvidenceKind) -> list[str]:
@@ -46,6 +47,10 @@ def remainder_sentences(diagnosis: Diagnosis) -> list[str]:
     if left is None:
         return []
     said = []
+    floor = diagnosis.gap.noise_floor
+    noise = None if floor is None else floor.nrmse_position
+    if left.nrmse_position is not None and noise and left.nrmse_position < _AS_NOISE * noise:
+        return [f"{percent(left.nrmse_position)} of the motion remains, which noise explains."]
     if left.nrmse_position is not None:
         share = "" if left.share is None else f", {percent(left.share)} of the refit's squared gap"
         said.append(f"{percent(left.nrmse_position)} of the motion remains{share}.")
@@ -60,7 +65,7 @@ def remainder_sentences(diagnosis: Diagnosis) -> list[str]:
 
 def place_words(place: Place) -> str:
     """Return a place as shown to a person, such as 'level 1, 3.1 to 16 Hz (4.4 sigma)'."""
-    low, high = (f"{end:.2g}" for end in place.band_hz)
+    low, high = map(hertz, place.band_hz)
     band = f"0 to {high} Hz" if place.lines == "slow" else f"{low} to {high} Hz"
     kind = "" if place.lines in ("all", "slow") else f", {place.lines} lines"
     sigma = f" ({place.sigma:.2g} \N{GREEK SMALL LETTER SIGMA})" if known(place.sigma) else ""
@@ -86,7 +91,15 @@ def percent(ratio: float | None) -> str:
     if ratio is None or not known(ratio):
         return "-"
     value = 100.0 * ratio
-    return f"{value:.2g}%" if abs(value) < 9.95 else f"{value:.0f}%"
+    size = abs(value)
+    if size >= 9.95 or size == 0.0:
+        return f"{value:.0f}%"
+    return f"{value:.{max(1 - math.floor(math.log10(size)), 1)}f}%"
+
+
+def hertz(frequency: float) -> str:
+    """Return a frequency with two digits below a hundred, in whole hertz above."""
+    return f"{frequency:.2g}" if frequency < 99.5 else f"{frequency:.0f}"
 
 
 def digits(estimate: Estimate) -> tuple[str, str, str]:

@@ -9,7 +9,7 @@ from typing import Literal
 from matplotlib.figure import Figure
 
 from fjr_kit.figure_style import EVEN, EXCITED, NOISE, ODD, WIDTH_IN
-from fjr_kit.plots import Plot, layout, numbers
+from fjr_kit.plots import BARRED, Plot, layout, numbers
 
 from ..outcome.cause_words import known, percent
 from ..outcome.diagnosis import Diagnosis
@@ -44,7 +44,8 @@ class Bar:
     @property
     def label(self) -> str:
         """What is written at its end."""
-        return percent(0.01 * self.end)
+        arrow = "to " if self.kind in ("less", "more") else ""
+        return arrow + percent(0.01 * self.end)
 
 
 def bars(diagnosis: Diagnosis) -> list[Bar]:
@@ -99,7 +100,7 @@ def waterfall_plot(diagnosis: Diagnosis) -> Plot | None:
             "base": numbers(start),
             "x": numbers([high - low for low, high in zip(start, end, strict=True)]),
             "text": [bar.label for _, bar in chosen],
-            "textposition": "outside", "cliponaxis": False, "width": 0.62,
+            "textposition": "outside", "cliponaxis": False, "width": 0.62, "showlegend": False,
             "marker": {"color": color},
             "hovertemplate": "%{text}<extra>%{fullData.name}</extra>",
         })  # fmt: skip
@@ -108,19 +109,19 @@ def waterfall_plot(diagnosis: Diagnosis) -> Plot | None:
     if lowest:
         axes["xaxis"]["range"] = [math.log10(lowest), math.log10(2.5 * greatest)]
     else:
-        axes["xaxis"]["range"] = [0.0, 1.18 * greatest]
+        axes["xaxis"]["range"] = [0.0, 1.22 * greatest]
     axes["yaxis"] |= {
         "tickvals": list(range(len(shown))),
         "ticktext": [bar.name for bar in shown],
         "range": [len(shown) - 0.4, -0.6],
         "showgrid": False,
     }
-    return {"data": traces, "layout": axes | {"showlegend": False}}
+    return {"data": traces, "layout": axes | BARRED}
 
 
 def height(diagnosis: Diagnosis) -> int:
     """Return how high the plot is, px."""
-    return 34 * len(bars(diagnosis)) + 70
+    return 34 * len(bars(diagnosis)) + 90
 
 
 def draw_waterfall(diagnosis: Diagnosis) -> Figure:

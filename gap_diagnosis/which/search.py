@@ -52,15 +52,9 @@ class Search:
     def __init__(
         self, fitter: Fitter, progress: Progress = lambda _: None, until: float = math.inf
     ) -> None:
-        """Take the fitter of the experiment.
-
-        Args:
-            fitter: fits explanations.
-            progress: told what is tried.
-            until: instant of `time.monotonic` after which no effect is added any more.
-        """
-        self._fitter, self._progress, self._until = fitter, progress, until
-        self._complete = True
+        """Take the fitter, who is told what is tried, and when to stop adding (`time.monotonic`)."""
+        self._fitter, self._progress = fitter, progress
+        self._until, self._complete = until, True
         self._fits: dict[tuple[str, ...], Fit] = {}
         self._refit: Fit | None = None
         self._groups = fitter.train.groups()
@@ -106,11 +100,7 @@ class Search:
         )  # fmt: skip
 
     def _extend(
-        self,
-        parent: Fit,
-        effects: Sequence[str],
-        most: int | None = None,
-        near: float = _NEAR,
+        self, parent: Fit, effects: Sequence[str], most: int | None = None, near: float = _NEAR
     ) -> None:
         """Fit the parent with each effect more, in the order of what their starts achieve.
 

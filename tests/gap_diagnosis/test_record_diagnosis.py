@@ -120,13 +120,13 @@ def test_the_gap_shrinks_step_by_step_to_the_noise(gravity):
     gaps = [s.nrmse_position for s in steps]
     assert gaps[0] > gaps[1] > 3.0 * gaps[2]
     floor = gravity.diagnosis.gap.noise_floor.nrmse_position
-    assert floor == pytest.approx(gaps[2] / np.sqrt(steps[2].chi2_per_dof), rel=0.1)
+    assert 0.7 * gaps[2] < floor < 1.1 * gaps[2]
 
 
 def test_the_summary_names_cause_share_remainder_and_evidence(gravity):
     assert "Missing: gravity" in gravity.text and "present" in gravity.text
     assert "with gravity" in gravity.text and "noise floor" in gravity.text
-    assert "The closed loop was simulated" not in gravity.text  # said with its reason
+    assert "of the motion remains, which noise explains." in gravity.text
     assert "The controller is known, so the closed loop was simulated." in gravity.text
     assert f"{gravity.out}/report.html".replace(" ", "") in gravity.text.replace(" ", "")
 
