@@ -109,7 +109,7 @@ def test_the_observer_is_a_lead_that_crosses_over_where_it_says():
     frequency, gain, rate = 4.0, 120.0, 1000.0
     law = lead(gain, frequency, rate)
     z = np.exp(2j * np.pi * np.array([frequency]) / rate)
-    value = np.polyval(law.numerator, z) / np.polyval(law.denominator, z)
+    value = np.polyval(law.position, z) / np.polyval(law.denominator, z)
     assert np.abs(value[0]) == pytest.approx(gain, rel=1e-9)
     assert np.degrees(np.angle(value[0])) == pytest.approx(54.9, abs=0.1)
 
@@ -119,7 +119,7 @@ def test_the_observer_takes_its_gain_from_the_record(backlash):
     assert crossover_hz(recorded) == pytest.approx(4.975)
     law = observer(recorded)
     z = np.exp(2j * np.pi * crossover_hz(recorded) / 1000.0)
-    gain = np.abs(np.polyval(law.numerator, z) / np.polyval(law.denominator, z))
+    gain = np.abs(np.polyval(law.position, z) / np.polyval(law.denominator, z))
     inertia = NOMINAL["jm"] + NOMINAL["j"]
     of_inertia = inertia * (2 * np.pi * crossover_hz(recorded)) ** 2
     assert of_inertia < gain < 3.0 * of_inertia  # friction adds to it
