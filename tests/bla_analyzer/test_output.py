@@ -192,7 +192,7 @@ def test_every_number_and_array_of_a_level_has_a_unit(result):
 @pytest.mark.parametrize(
     ("edit", "field"),
     [
-        (lambda d: d.update(schema="fjr_rig/result/2"), "schema"),
+        (lambda d: d.update(schema="fjr_rig/result/3"), "schema"),
         (lambda d: d.pop("periods"), "periods"),
         (lambda d: d["levels"][1]["bla"]["g"].update(unit="m"), "levels.1.bla.g.unit"),
         (lambda d: d["levels"][1]["bla"]["g"].pop("im"), "levels.1.bla.g.im"),
