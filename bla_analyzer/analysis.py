@@ -1,4 +1,8 @@
-"""Analysis of a folder of bags: BLA, noise and distortion of each level, as a `Result`."""
+"""Analysis of a folder of bags: BLA, noise and distortion of each level, as a `Result`.
+
+What the excitation is decides the method: multisines go the periodic way of this module, all else
+goes to `record_analysis`.
+"""
 
 from __future__ import annotations
 
@@ -8,34 +12,42 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 
-from fjr_interface.bags.reader import DEFAULT, SignalMap
+from fjr_interface.bags.reader import DEFAULT, SignalMap, find_bags
+from fjr_interface.experiment import RecordDescription
 from fjr_interface.resampling.accuracy import Resampling
+from fjr_interface.resampling.resampled_reader import open_bag
 from fjr_kit.check import Check
 from fjr_kit.errors import InputError
-from fjr_records.experiment_folder import ExperimentBag, ExperimentFolder, Override, open_experiment
+from fjr_records.discover import NoPeriodError
+from fjr_records.experiment_bag import ExperimentBag, Override
+from fjr_records.experiment_folder import ExperimentFolder, open_experiment
+from fjr_records.lines import Grid, Lines
 from fjr_records.realization import Realization, read_realization, signal_blocks
+from fjr_records.records import read_records, reference_optional
+from fjr_records.spectra import RealizationSpectra
 
+from .bla.arbitrary import arbitrary_bla, run_of_lines
 from .bla.fast import fast_bla
+from .bla.repeats import pooled, repeat_groups
 from .bla.robust import INPUT_VARIANCE_LIMIT, robust_bla
-from .checks import check_realization, periodicity
+from .checks import check_realization, periodicity, reliable_lines
 from .compare.metrics import ReferenceModel, compare
 from .distortion.levels import line_levels
+from .record_analysis import analyze_records
 from .results.result import BlaEstimate, LevelResult, Method, Result
 
 Progress = Callable[[int, int, str], None]
 """Called after each bag with (bags done, bags, name of the bag)."""
 
-SAME_PHASES = 0.05
-"""Two references whose spectra differ by less than this (relative) are the same realization."""
-
 
 def analyze(
     folder: Path | str,
     *,
-    method: Method = "robust",
+    method: Method | None = None,
     signal_map: SignalMap = DEFAULT,
     models: Sequence[ReferenceModel] = (),
     override: Override | None = None,
@@ -46,7 +58,10 @@ def analyze(
 
     Args:
         folder: experiment folder, or one bag.
-        method: robust (over realizations) or fast (first realization of each level).
+        method: robust (over realizations), fast (first realization of each level, by its detection
+            lines) or local (local polynomials, any excitation); None for what fits: multisines of
+            two or more realizations robust, of one fast if it has odd detection lines and two
+            periods, all else local.
         signal_map: which topics and fields are reference, torque and position.
         models: models to compare the BLA with.
         override: period, transient and number of periods, instead of what the bags say.
@@ -61,10 +76,16 @@ def analyze(
         InputError: bags that are not whole or do not belong together, data that the method cannot
             use, or a response that is periodic at no level.
     """
-    if method not in ("robust", "fast"):
-        raise InputError(f"method must be robust or fast, not {method!r}.")
+    if method not in (None, *get_args(Method)):
+        raise InputError(f"method must be robust, fast or local, not {method!r}.")
     sources = replace(signal_map, link=None)
-    experiment = open_experiment(folder, sources, override=override, resampling=resampling)
+    experiment = _periodic(folder, sources, override, resampling)
+    if isinstance(experiment, NoPeriodError):
+        if method in ("robust", "fast"):
+            raise experiment
+        records = read_records(folder, sources, resampling=resampling)
+        records = replace(records, notes=(_not_periodic(experiment), *records.notes))
+        return analyze_records(records, models)
     realizations = _read(experiment, progress)
     levels: list[LevelResult] = []
     checks: list[Check] = []
@@ -82,6 +103,7 @@ def analyze(
         raise InputError(f"{folder}: {notes[-len(levels)]}")
     return Result(
         source=str(folder),
+        excitation="periodic",
         sample_rate_hz=experiment.grid.sample_rate_hz,
         samples_per_period=experiment.grid.samples_per_period,
         periods=experiment.grid.periods,
@@ -93,6 +115,43 @@ def analyze(
         notes=tuple(notes),
         controller=experiment.controller,
     )
+
+
+def _periodic(
+    folder: Path | str,
+    signal_map: SignalMap,
+    override: Override | None,
+    resampling: Resampling | None,
+) -> ExperimentFolder | NoPeriodError:
+    """Return the experiment, or why it is none of multisines.
+
+    Raises:
+        InputError: bags of both kinds, or bags that are damaged.
+    """
+    optional = reference_optional(signal_map)
+    readers = [open_bag(bag, optional, resampling) for bag in find_bags(folder)]
+    records = [r.path.name for r in readers if isinstance(r.experiment, RecordDescription)]
+    if records:
+        if len(records) < len(readers):
+            other = next(r.path.name for r in readers if r.path.name not in records)
+            raise InputError(
+                f"{folder}: {records[0]} is a record that is not periodic but {other} is a "
+                "multisine; put them into separate folders."
+            )
+        return NoPeriodError(
+            f"{folder}: described as records that are not periodic; robust and fast method are for "
+            "multisines, so leave the method out."
+        )
+    try:
+        return open_experiment(folder, signal_map, override=override, resampling=resampling)
+    except NoPeriodError as error:
+        if any(r.experiment is not None for r in readers) or override not in (None, Override()):
+            raise
+        return error
+
+
+def _not_periodic(why: NoPeriodError) -> str:
+    return f"Not analysed as periodic: {str(why).partition('; ')[0].rstrip('.')}."
 
 
 def _read(experiment: ExperimentFolder, progress: Progress | None) -> list[Realization]:
@@ -125,33 +184,70 @@ def _analyze_level(
     level: int,
     group: Sequence[Realization],
     experiment: ExperimentFolder,
-    method: Method,
+    method: Method | None,
     models: Sequence[ReferenceModel],
 ) -> tuple[LevelResult, list[Check], list[str]]:
-    grid = experiment.grid
-    checks = [check for one in group for check in check_realization(one, grid.lines.excited)]
-    used = group if method == "robust" else group[:1]
-    reason = _refusal(used, method)
+    lines = experiment.grid.lines
+    checks = [check for one in group for check in check_realization(one, lines.excited)]
+    groups, notes = _by_reference(level, group, experiment)
+    spectra = [pooled([one.spectra for one in members]) for members in groups]
+    chosen = method or _fitting_method(spectra, lines)
+    used = spectra[:1] if chosen == "fast" else spectra
+    reason = _refusal(groups[0] if chosen == "fast" else group, len(spectra), chosen)
     bla = None
-    if reason is None and method == "robust":
-        bla = robust_bla([one.spectra for one in used], grid.lines.excited)
-    elif reason is None:
-        bla = fast_bla(used[0].spectra, grid.lines)
-    notes = [reason] if reason else _caveats(group, checks, bla)
+    if reason is None:
+        bla = _estimate(used, experiment.grid, chosen)
+        checks.append(reliable_lines(level, bla))
+    notes += [reason] if reason else _caveats(len(spectra), group, checks, bla)
     result = _level_result(level, group, used, experiment, bla, models)
     return result, checks, [f"level {level}: {note}" for note in notes]
+
+
+def _by_reference(
+    level: int, group: Sequence[Realization], experiment: ExperimentFolder
+) -> tuple[list[list[Realization]], list[str]]:
+    """Return the realizations of each reference, and what to say where there are repeats."""
+    described = {
+        bag.realization: bag.experiment.repeat_of for bag in experiment.bags if bag.level == level
+    }
+    numbers = [one.realization for one in group]
+    found = repeat_groups(
+        [one.spectra for one in group], [described[number] for number in numbers], numbers
+    )
+    notes = []
+    if len(found) < len(group):
+        notes.append(
+            f"{len(group)} realizations play {len(found)} different references; those of the same "
+            "reference are averaged as further periods of one, and what differs between them "
+            "counts as noise."
+        )
+    return [[group[i] for i in members] for members in found], notes
+
+
+def _fitting_method(spectra: Sequence[RealizationSpectra], lines: Lines) -> Method:
+    if len(spectra) > 1:
+        return "robust"
+    return "fast" if lines.odd.size and spectra[0].periods > 1 else "local"
+
+
+def _estimate(spectra: Sequence[RealizationSpectra], grid: Grid, method: Method) -> BlaEstimate:
+    if method == "robust":
+        return robust_bla(spectra, grid.lines.excited)
+    if method == "fast":
+        return fast_bla(spectra[0], grid.lines)
+    runs = [run_of_lines(one, grid.lines.excited) for one in spectra]
+    return arbitrary_bla(runs, grid.sample_rate_hz, at_hz=runs[0].frequency_hz).bla
 
 
 def _level_result(
     level: int,
     group: Sequence[Realization],
-    used: Sequence[Realization],
+    spectra: Sequence[RealizationSpectra],
     experiment: ExperimentFolder,
     bla: BlaEstimate | None,
     models: Sequence[ReferenceModel],
 ) -> LevelResult:
     grid = experiment.grid
-    spectra = [one.spectra for one in used]
     g = None if bla is None else bla.g
     rms = np.sqrt(np.mean([one.mean_square for one in group], axis=0))
     peak = np.max([one.peak for one in group], axis=0)
@@ -166,6 +262,7 @@ def _level_result(
         excited=line_levels(spectra, grid.lines, grid.lines.excited, g),
         odd=line_levels(spectra, grid.lines, grid.lines.odd, g),
         even=line_levels(spectra, grid.lines, grid.lines.even, g),
+        left_out_hz=np.empty(0),
         comparisons=tuple(
             compare(bla, model, grid.sample_rate_hz) for model in models if bla is not None
         ),
@@ -178,7 +275,7 @@ def _level_result(
     )
 
 
-def _refusal(group: Sequence[Realization], method: Method) -> str | None:
+def _refusal(group: Sequence[Realization], references: int, method: Method) -> str | None:
     """Return why these realizations allow no BLA, or None."""
     failed = [check for check in map(periodicity, group) if not check.passed]
     if failed:
@@ -188,37 +285,22 @@ def _refusal(group: Sequence[Realization], method: Method) -> str | None:
             f"is no BLA (up to {worst.value:.2g} of y differs from period to period); lower the "
             "amplitude or raise the sample rate."
         )
-    if method == "robust" and len(group) == 1:
+    if method == "robust" and references == 1:
         return (
-            "the robust method needs two or more realizations and has one; record more, or use the "
-            "fast method."
+            "the robust method needs two or more realizations with different references and has "
+            "one; record more, or leave the method out."
         )
-    if method == "robust":
-        _refuse_duplicates(group)
     return None
 
 
-def _refuse_duplicates(group: Sequence[Realization]) -> None:
-    references = np.array([one.spectra.reference for one in group])
-    scale = np.linalg.norm(references, axis=1)
-    for i, one in enumerate(group):
-        same = np.linalg.norm(references[i + 1 :] - references[i], axis=1) < SAME_PHASES * scale[i]
-        if same.any():
-            other = group[i + 1 + int(same.argmax())]
-            raise InputError(
-                f"{one.name} and {other.name} play the same reference, but the robust method needs "
-                "new phases in each realization; remove one of them or use the fast method."
-            )
-
-
 def _caveats(
-    group: Sequence[Realization], checks: Sequence[Check], bla: BlaEstimate | None
+    references: int, group: Sequence[Realization], checks: Sequence[Check], bla: BlaEstimate | None
 ) -> list[str]:
     """Return what a reader of the BLA must know."""
     assert bla is not None
     notes = []
-    if bla.method == "fast" and len(group) > 1:
-        notes.append(f"the fast method uses the first of {len(group)} realizations.")
+    if bla.method == "fast" and references > 1:
+        notes.append(f"the fast method uses the first of {references} realizations.")
     if bla.method == "fast" and np.isnan(bla.var_total).all():
         notes.append("there are no odd detection lines, so the total variance is unknown.")
     if bla.periods == 1:

@@ -1,4 +1,4 @@
-"""Checks of each realization: periodicity, transient, input signal-to-noise ratio and unit."""
+"""Checks of each realization (periodicity, transient, noise, unit) and of the BLA of a level."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from fjr_records.realization import FALSE_ALARM, Realization
 from fjr_records.units import FOLLOWING_LIMIT, following, unit_sentence
 
 from .bla.robust import INPUT_VARIANCE_LIMIT
+from .results.result import BlaEstimate
 
 PERIODICITY_LIMIT = 0.015
 """Greatest mismatch of y in the band (relative rms) beyond what noise explains, see
@@ -17,6 +18,9 @@ settles; a real motor bench, disturbed in the band by more than its encoder's no
 0.010."""
 TRANSIENT_LIMIT = 0.01
 """Greatest rms of a remaining transient relative to y, where it starts."""
+
+UNRELIABLE_LIMIT = 0.5
+"""Greatest share of lines that may be unreliable, or whose 95 % disc may hold zero."""
 
 
 def check_realization(realization: Realization, excited: np.ndarray) -> tuple[Check, ...]:
@@ -116,3 +120,31 @@ def position_unit(realization: Realization, excited: np.ndarray) -> Check:
             f"y is {value:.3g} times r at the lowest lines, as in one unit."
         )
     return _check(realization, "position_unit", value, FOLLOWING_LIMIT, sentence)
+
+
+def reliable_lines(level: int, bla: BlaEstimate | None) -> Check:
+    """Tell whether most lines of the BLA can be used.
+
+    A line cannot where Var(U)/|U|^2 is not small or where the 95 % disc of G holds zero.
+    """
+    share, lines = 1.0, 0
+    if bla is not None:
+        bad = ~bla.reliable | (bla.radius_95 >= np.abs(bla.g))
+        share, lines = float(np.mean(bad)), bad.size
+    sentence = f"{1.0 - share:.0%} of the {lines} lines of the BLA can be used."
+    if share > UNRELIABLE_LIMIT:
+        sentence = (
+            f"{share:.0%} of the {lines} lines of the BLA are unreliable: the torque hardly "
+            "follows the reference there, or the 95 % disc holds zero; excite more, or check that "
+            "the reference belongs to this record."
+        )
+    if bla is None:
+        sentence = "there is no BLA."
+    return Check(
+        name="reliable_lines",
+        level=level,
+        passed=share <= UNRELIABLE_LIMIT,
+        value=share,
+        limit=UNRELIABLE_LIMIT,
+        sentence=f"level {level}: {sentence}",
+    )

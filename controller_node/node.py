@@ -7,11 +7,10 @@ import math
 import time
 
 from rclpy.duration import Duration
-from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
 from fjr_interface import topics
-from fjr_interface.bags.joint_state import JointStateReader, JointStateWriter, LayoutError
+from fjr_interface.bags.joint_state import JointStateWriter, LayoutError
 from fjr_interface.experiment import Experiment
 from fjr_interface.health import ERROR, OK, WARN, Health, Speed
 from fjr_interface.parameters import ParameterGroup
@@ -22,6 +21,7 @@ from fjr_interface.waiting import Lack
 from fjr_kit.errors import InputError
 
 from . import limits, pd_filtered
+from .lockstep import LockstepController
 from .real_time import Answers, RealTimeController
 from .source import Source
 from .supervised_law import SupervisedLaw
@@ -51,39 +51,20 @@ class ControllerNode(runtime.RigNode):
         """Create publishers, subscriptions and the services of the emergency stop."""
         super().__init__("controller", PARAMETERS)
         self._encode = JointStateWriter("effort", self.values["joint"]).encode
-        self._decode_reference = JointStateReader("position").decode
-        self._decode_position = JointStateReader("position").decode
         self._real_time = self.values["mode"] == REAL_TIME
         self._law = SupervisedLaw(self.values, real_time=self._real_time)
         self._loop = RealTimeController(self._law, self.values)
-        self._references: dict[int, float] = {}
+        self._lockstep = LockstepController(self._law, self.values)
         self._newest_reference = 0
         self._stream = time.time_ns()  # not one of an earlier controller
-        self._position: tuple[int, float] | None = None
-        self._ready = False
-        self._replaced = False
         self._tripped: str | None = None
         self._speed = Speed()
         self._excitations: frozenset[bytes] = frozenset()
-        self._start_run()
-        self._torque = self.create_publisher(
-            JointState, topics.MOTOR_TORQUE.topic, runtime.SIGNAL_QOS
-        )
+        self._torque = self.offer(topics.MOTOR_TORQUE)
         self.claim(self._torque)
-        self._reference = self.create_subscription(
-            JointState, topics.REFERENCE.topic, self._on_reference, runtime.SIGNAL_QOS, raw=True
-        )
-        self._positions = self.create_subscription(
-            JointState,
-            topics.MOTOR_POSITION.topic,
-            self._on_position_in_real_time if self._real_time else self._on_position,
-            runtime.SIGNAL_QOS,
-            raw=True,
-        )
-        self._sources = {
-            topics.REFERENCE.topic: Source(self, self._reference),
-            topics.MOTOR_POSITION.topic: Source(self, self._positions),
-        }
+        on_position = self._on_position_in_real_time if self._real_time else self._on_position
+        self._reference = Source(self, topics.REFERENCE, self._on_reference)
+        self._position = Source(self, topics.MOTOR_POSITION, on_position)
         self.call_every(_LOOK_S, self._look_for_others)
         self.create_subscription(
             String, topics.EXPERIMENT_TOPIC, self._on_experiment, runtime.EXPERIMENT_QOS
@@ -112,12 +93,6 @@ class ControllerNode(runtime.RigNode):
         }
         self._description.publish(String(data=json.dumps(description)))
 
-    def _start_run(self) -> None:
-        self._law.begin_run(self.values)
-        self._sample = 0
-        self._rate = self.values["sample_rate_hz"]
-        self._first_ns = self._due_ns = topics.stamp_ns(1, self._rate)
-
     def _on_experiment(self, message: String) -> None:
         if not self._real_time:
             return  # its end is that of the positions
@@ -136,7 +111,7 @@ class ControllerNode(runtime.RigNode):
 
     def _look_for_others(self) -> None:
         """Refuse a second publisher: in real time each message looks for one, too."""
-        for source in self._sources.values():
+        for source in (self._reference, self._position):
             if self._real_time:
                 source.look()
                 self._refuse_second(source)
@@ -149,93 +124,65 @@ class ControllerNode(runtime.RigNode):
 
     def _on_reference(self, message: bytes) -> None:
         if self._real_time:
-            self._refuse_second(self._sources[topics.REFERENCE.topic])
-        for each in (message, *runtime.take_all(self._reference)):  # they come in bursts
-            try:
-                stamp, value = self._decode_reference(each)
-            except LayoutError as error:
-                self._refuse_unreadable(error, topics.REFERENCE.topic)
+            self._refuse_second(self._reference)
+        for each in (
+            message,
+            *runtime.take_all(self._reference.subscription),
+        ):  # they come in bursts
+            sample = self._read(self._reference, each)
+            if sample is None:
                 continue
-            self._check_number(stamp, value, topics.REFERENCE.topic)
+            stamp, _ = sample
             if stamp <= self._newest_reference or not self._newest_reference:
                 self._leave_run()
             self._newest_reference = stamp
-            if self._real_time:
-                self._loop.reference(stamp, value)
-            else:
-                self._references[stamp] = value
+            (self._loop if self._real_time else self._lockstep).reference(*sample)
         self._answer()
 
     def _leave_run(self) -> None:
         if self._real_time:
             self._loop.leave_run(self.values)
             keep_pauses_out()
-        self._references.clear()
+        elif self._lockstep.leave_run():
+            self.stop_waiting()
         self._stream += 1
         self._describe()
-        if self._sample == 1 and self._position is not None:
-            return  # a first position that overtook its reference
-        self.stop_waiting()
-        self._replaced, self._ready, self._position = self._sample > 0, False, None
 
     def _on_position(self, message: bytes) -> None:
-        try:
-            stamp, value = self._decode_position(message)
-        except LayoutError as error:
-            self._refuse_unreadable(error, topics.MOTOR_POSITION.topic)
-            return
-        self._check_number(stamp, value, topics.MOTOR_POSITION.topic)
-        if stamp == self._first_ns:
+        sample = self._read(self._position, message)
+        assert sample is not None  # an unreadable one ends a lockstep
+        if first := self._lockstep.is_first(sample[0]):
             self._look_for_others()
-            self._start_run()
-            self._ready = self._replaced = False
-        elif stamp != self._due_ns:
-            raise InputError(
-                f"Topic motor_position: stamp {stamp * 1e-9:.6f} s where {self._due_ns * 1e-9:.6f} "
-                f"s was due at sample_rate_hz {self._rate:g}; give all nodes the same rate and "
-                "start the realization again."
-            )
-        elif self._replaced:
-            return  # of the run that the new references replace
-        self._sample += 1
-        self._due_ns = topics.stamp_ns(self._sample + 1, self._rate)
-        self._position = stamp, value
-        if self._sample == 1:
+            self._lockstep.begin_run(self.values)
+        if not self._lockstep.position(*sample):
+            return
+        if first:
             self.wait_until(self._lacking, self._begin)
         else:
             self._answer()
 
     def _lacking(self) -> Lack | None:
-        return self.unread(self._torque) or self.unwritten(self._reference, "excitation")
+        return self.unread(self._torque) or self.unwritten(
+            self._reference.subscription, "excitation"
+        )
 
     def _begin(self) -> None:
-        self._ready = True
+        self._lockstep.go_on()
         self._excitations = self.writers("excitation")
         self._answer()
 
     def _answer(self) -> None:
-        """Publish the torque if the sample is complete: its position and its reference are here."""
-        if not self._ready or self._position is None:
-            return
-        stamp, position = self._position
-        reference = self._references.get(stamp)
-        if reference is None:
-            return
-        self._position = None
-        self._torque.publish(self._encode(stamp, self._law.torque(reference, position)))
-        self._tell_trip()
-        # The latest ones stay: a run that is replaced may have used some of the new one's.
-        self._references.pop(topics.stamp_ns(self._sample - topics.SIGNAL_DEPTH, self._rate), None)
+        """Publish the torque of a lockstep's sample if it is complete."""
+        if answer := self._lockstep.answer():
+            self._torque.publish(self._encode(*answer))
+            self._tell_trip()
 
     def _on_position_in_real_time(self, message: bytes) -> None:
         now_ns = time.monotonic_ns()
-        self._refuse_second(self._sources[topics.MOTOR_POSITION.topic])
-        try:
-            stamp, value = self._decode_position(message)
-        except LayoutError as error:
-            self._refuse_unreadable(error, topics.MOTOR_POSITION.topic)
-            return
-        self._say(self._loop.position(now_ns, stamp, value))
+        self._refuse_second(self._position)
+        sample = self._read(self._position, message)
+        if sample is not None:
+            self._say(self._loop.position(now_ns, *sample))
 
     def _trip(self, reason: str, *, at_once: bool = False) -> None:
         self._say(self._loop.trip(time.monotonic_ns(), reason, at_once=at_once))
@@ -260,18 +207,23 @@ class ControllerNode(runtime.RigNode):
             self._say(self._loop.serve(time.monotonic_ns()))
         self._torque.wait_for_all_acked(Duration(seconds=_LAST_WORD_S))
 
-    def _refuse_unreadable(self, error: LayoutError, topic: str) -> None:
-        """Trip at a message that is no JointState of one joint; it ends a lockstep."""
-        if not self._real_time:
-            raise InputError(f"Topic {topic}: {error}; publish JointState with one joint.")
-        at_once = topic == topics.MOTOR_POSITION.topic
-        self._trip(f"a message of {topic} is unreadable: {error}", at_once=at_once)
-
-    def _check_number(self, stamp: int, value: float, topic: str) -> None:
+    def _read(self, source: Source, message: bytes) -> tuple[int, float] | None:
+        """Return stamp and value of a message; an unreadable one trips, or ends a lockstep."""
+        try:
+            stamp, value = source.decode(message)
+        except LayoutError as error:
+            if not self._real_time:
+                raise InputError(
+                    f"Topic {source.topic}: {error}; publish JointState with one joint."
+                ) from None
+            at_once = source is self._position
+            self._trip(f"a message of {source.topic} is unreadable: {error}", at_once=at_once)
+            return None
         if not self._real_time and not math.isfinite(value):
             raise InputError(
-                f"Topic {topic}: {value} at {stamp * 1e-9:.6f} s; no torque from that."
+                f"Topic {source.topic}: {value} at {stamp * 1e-9:.6f} s; no torque from that."
             )
+        return stamp, value
 
     def _estop(self) -> tuple[bool, str]:
         self._law.trip("emergency stop")
@@ -304,7 +256,7 @@ class ControllerNode(runtime.RigNode):
         """Return trip and counters of the run."""
         safety, loop = self._law.safety, self._loop
         bad = loop.missing + loop.lost + loop.stale
-        samples = loop.answered if self._real_time else self._sample
+        samples = loop.answered if self._real_time else self._lockstep.samples
         return Health(
             ERROR if safety.tripped else WARN if bad else OK,
             self._state,
@@ -312,13 +264,13 @@ class ControllerNode(runtime.RigNode):
                 "mode": self.values["mode"],
                 "hardware": str(self.values["hardware"]).lower(),
                 "samples": samples,
-                "speed (x real time)": self._speed.look(samples, self._rate),
+                "speed (x real time)": self._speed.look(samples, self.values["sample_rate_hz"]),
                 "saturated samples": self._law.saturated + safety.saturated,
                 "missing references": loop.missing,
                 "lost positions": loop.lost,
                 "stale positions": loop.stale,
-                "position from": self._sources[topics.MOTOR_POSITION.topic].said,
-                "reference from": self._sources[topics.REFERENCE.topic].said,
+                "position from": self._position.said,
+                "reference from": self._reference.said,
                 "trips": safety.trips,
                 "trip": safety.tripped or "none",
             },
@@ -331,11 +283,11 @@ class ControllerNode(runtime.RigNode):
                 "a new realization: the one under way began without this controller",
                 "`fjr reset` starts one",
             )
-        if self._position is not None:
-            reference = f"the reference of {self._position[0] * 1e-9:.6f} s"
+        if self._lockstep.waiting_ns is not None:
+            reference = f"the reference of {self._lockstep.waiting_ns * 1e-9:.6f} s"
             return self.overdue(reference, "excitation", self._excitations)
-        return self.unwritten(self._positions, "simulator") or self.unwritten(
-            self._reference, "excitation"
+        return self.unwritten(self._position.subscription, "simulator") or self.unwritten(
+            self._reference.subscription, "excitation"
         )
 
 

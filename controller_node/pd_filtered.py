@@ -87,8 +87,7 @@ def from_description(controller: Mapping[str, Any], sample_rate_hz: float) -> di
     source = "experiment description: controller"
     if controller.get("kind") != "pd_filtered":
         raise InputError(
-            f"{source}.kind is {controller.get('kind')!r}; "
-            "known are pd_filtered and transfer_function."
+            f"{source}.kind is {controller.get('kind')!r}; here it must be pd_filtered."
         )
     missing = [name for name in ("p", "d", "n") if name not in controller]
     if missing:

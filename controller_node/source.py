@@ -1,23 +1,32 @@
-"""The one publisher of each signal to which the controller listens."""
+"""A signal to which the controller listens: its messages, and its one publisher."""
 
 from __future__ import annotations
 
-from rclpy.node import Node
-from rclpy.subscription import Subscription
+from collections.abc import Callable
+
+from fjr_interface.bags.joint_state import JointStateReader
+from fjr_interface.ros.runtime import RigNode
+from fjr_interface.topics import Signal
 
 _UNKNOWN = "_NODE_NAME_UNKNOWN_"  # of a publisher whose node has not been heard of yet
 
 
 class Source:
-    """The publishers of one topic.
+    """One signal and its publishers.
 
     Attributes:
-        names: full names of their nodes, sorted; one that publishes twice is there twice.
+        topic: name of the signal's topic, without the namespace.
+        subscription: hears the serialized messages.
+        decode: returns stamp (ns) and value of a message; raises LayoutError if it is malformed.
+        names: full names of the publishers' nodes, sorted; one that publishes twice is there twice.
     """
 
-    def __init__(self, node: Node, subscription: Subscription) -> None:
-        """Watch the publishers that a subscription of the node hears."""
-        self._node, self._subscription = node, subscription
+    def __init__(self, node: RigNode, signal: Signal, callback: Callable[[bytes], None]) -> None:
+        """Let a callback of the node hear a signal."""
+        self.topic = signal.topic
+        self.subscription = node.hear(signal, callback)
+        self.decode = JointStateReader(signal.field).decode
+        self._node = node
         self._count = 0
         self.names: list[str] = []
 
@@ -28,20 +37,20 @@ class Source:
 
     def second(self) -> str | None:
         """Return that somebody else is heard, too; None if not. Cheap enough for each message."""
-        count = self._subscription.get_publisher_count()
+        count = self.subscription.get_publisher_count()
         if count != self._count:
             self.look()
         if count < 2:
             return None
         return (
-            f"{self._subscription.topic_name} has {count} publishers ({self.said}); leave one of "
+            f"{self.subscription.topic_name} has {count} publishers ({self.said}); leave one of "
             "them, a killed one is forgotten after 10 s"
         )
 
     def look(self) -> None:
         """Ask the graph who publishes."""
-        self._count = self._subscription.get_publisher_count()
-        publishers = self._node.get_publishers_info_by_topic(self._subscription.topic_name)
+        self._count = self.subscription.get_publisher_count()
+        publishers = self._node.get_publishers_info_by_topic(self.subscription.topic_name)
         self.names = sorted(
             f"{each.node_namespace.rstrip('/')}/{each.node_name}"
             for each in publishers
@@ -57,6 +66,6 @@ class Source:
         if len(set(self.names)) < 2:
             return None
         return (
-            f"Topic {self._subscription.topic_name} has publishers of different nodes "
+            f"Topic {self.subscription.topic_name} has publishers of different nodes "
             f"({self.said}); stop all but one and start the realization again."
         )

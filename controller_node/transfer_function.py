@@ -1,28 +1,30 @@
-"""A controller given as a discrete transfer function, for rigs whose law is not the default one.
+"""Any linear law of one or two degrees of freedom, discrete, with a clamped torque.
 
-    C(z) = (b0 + b1 z^-1 + ... + bn z^-n) / (a0 + a1 z^-1 + ... + an z^-n)
+    u = sat(C_r(z) r - C_y(z) y),   C_r = b_r / a,   C_y = b_y / a
 
-from e = r - y (rad) to u (N m), at the sample rate of the experiment, as `scipy.signal.lfilter`
-takes it. Written in descending powers of z with lists of the same length, the coefficients are the
-same. The state is zero at the start; the output is clamped to the torque limit, the state is not.
+with b and a in powers z^0, z^-1, ... at the rate of the experiment, r and y in rad, u in N m. A
+law from r - y to u has b_r = b_y; a feed-forward of r is in b_r. There is one denominator and one
+state, so that an integrator integrates r - y and not each of both. The torque is clamped to its
+limit, the state is not: there is no anti-windup.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
 
 import numpy as np
+from scipy.signal import lfilter
 
 from fjr_kit.compiled import inlined
 from fjr_kit.errors import InputError
 
-from . import pd_filtered
+from .polynomials import Ratio, added, together
 
-KIND = "transfer_function"
 _OUTSIDE = 1.0 + 1e-6  # poles on the unit circle integrate, rounding included
+_CONSISTENT = 1e-9
 
 
 @dataclass(frozen=True)
@@ -30,12 +32,14 @@ class TransferFunction:
     """A discrete control law.
 
     Attributes:
-        numerator: b0...bn, float64 (n + 1,).
-        denominator: 1, a1...an, of the same length.
+        reference: numerator of C_r, float64 (n + 1,).
+        position: numerator of C_y, of the same length.
+        denominator: 1, a1...an of both, of the same length.
         limit_nm: the torque is clamped to +- this.
     """
 
-    numerator: np.ndarray
+    reference: np.ndarray
+    position: np.ndarray
     denominator: np.ndarray
     limit_nm: float = math.inf
 
@@ -43,11 +47,16 @@ class TransferFunction:
     def of(
         cls, numerator: Sequence[float], denominator: Sequence[float], limit_nm: float = math.inf
     ) -> TransferFunction:
-        """Return the law with both polynomials of one length and a0 = 1."""
-        b, a = np.zeros((2, max(len(numerator), len(denominator))))
-        b[: len(numerator)] = numerator
-        a[: len(denominator)] = denominator
-        return cls(b / a[0], a / a[0], limit_nm)
+        """Return the law from r - y to u."""
+        b = np.asarray(numerator, float)
+        return cls._padded(b, b, np.asarray(denominator, float), limit_nm)
+
+    @classmethod
+    def of_two(
+        cls, reference: Ratio, position: Ratio, limit_nm: float = math.inf
+    ) -> TransferFunction:
+        """Return the law of two transfer functions, numerator and denominator each."""
+        return cls._padded(*together(reference, position), limit_nm)
 
     @classmethod
     def of_pd(cls, coefficients: np.ndarray) -> TransferFunction:
@@ -55,96 +64,164 @@ class TransferFunction:
         p, dn, decay, limit = coefficients.tolist()
         return cls.of([p + dn, -p * decay - dn], [1.0, -decay], limit)
 
+    @classmethod
+    def _padded(
+        cls, reference: np.ndarray, position: np.ndarray, denominator: np.ndarray, limit_nm: float
+    ) -> TransferFunction:
+        zero = np.zeros(max(reference.size, position.size, denominator.size))
+        a0 = denominator[0]
+        b_r, b_y, a = (added(part, zero) / a0 for part in (reference, position, denominator))
+        return cls(b_r, b_y, a, limit_nm)
+
     @property
+    def one_degree(self) -> bool:
+        """Whether the law is one from r - y to u."""
+        return np.array_equal(self.reference, self.position)
+
+    @property
+    def states(self) -> int:
+        """Length of the state."""
+        return self.denominator.size - 1
+
+    @cached_property
     def slowest_pole(self) -> float:
         """Greatest magnitude of a pole: how slowly the state is forgotten; 1 never."""
         return float(np.abs(np.roots(self.denominator)).max(initial=0.0))
 
+    @cached_property
+    def coefficients(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+        """What `step` takes: C_y, acting on r - y, C_r - C_y, acting on r, denominator, limit.
+
+        Split so, a law of one degree computes with r - y alone, to the last bit.
+        """
+        return self.position, self.reference - self.position, self.denominator, self.limit_nm
+
+    def checked(self, source: str) -> TransferFunction:
+        """Return this law; raise InputError that begins with `source` if it cannot be one."""
+        if not self.limit_nm > 0.0:
+            raise InputError(f"{source}.torque_limit_nm must be greater than zero or null.")
+        polynomials = (self.reference, self.position, self.denominator)
+        if not np.isfinite(np.concatenate(polynomials)).all():
+            raise InputError(f"{source} has coefficients that are not finite; correct its numbers.")
+        if self.slowest_pole > _OUTSIDE:
+            raise InputError(
+                f"{source} has a pole of magnitude {self.slowest_pole:.6g} outside the unit "
+                "circle; correct its denominator (discrete: powers z^0, z^-1, ...)."
+            )
+        return self
+
+    def response(
+        self, frequency_hz: np.ndarray, sample_rate_hz: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return C_r and C_y, complex of the shape of `frequency_hz`, N m/rad."""
+        delay = np.exp(-2j * np.pi * np.asarray(frequency_hz, float) / sample_rate_hz)
+        parts = (self.reference, self.position, self.denominator)
+        r, y, a = (np.polynomial.polynomial.polyval(delay, part) for part in parts)
+        with np.errstate(divide="ignore", invalid="ignore"):  # an integrator at frequency zero
+            return r / a, y / a
+
+    def unlimited(
+        self, reference: np.ndarray, position: np.ndarray, state: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Return the torque of recorded signals without the limit, float64 (samples,) in N m.
+
+        Args:
+            reference: r, (samples,) in rad.
+            position: y, likewise.
+            state: state before the first sample, (n,); None for zero.
+
+        Raises:
+            InputError: r and y differ in length.
+        """
+        if reference.shape != position.shape:
+            raise InputError(
+                f"The reference has {reference.size} samples and the position {position.size}; "
+                "a control law needs both of one length."
+            )
+        b, forward, a, _ = self.coefficients
+        zi = np.zeros(self.states) if state is None else state
+        torque = lfilter(b, a, reference - position, zi=zi)[0]
+        return torque + lfilter(forward, a, reference) if forward.any() else torque
+
+    def clamped(self, torque: np.ndarray) -> np.ndarray:
+        """Return a torque within the limit."""
+        return np.clip(torque, -self.limit_nm, self.limit_nm)
+
+    def steady_state(
+        self, reference: float, position: float, torque: float | None = None
+    ) -> np.ndarray | None:
+        """Return the state in which constant r and y give a constant torque before the limit.
+
+        Args:
+            reference: r (rad).
+            position: y (rad).
+            torque: u (N m); an integrating law has any, where C_r and C_y integrate r - y to
+                nothing. None takes the law's own, and zero for an integrating one.
+
+        Returns:
+            float64 (n,); None if there is no such state.
+        """
+        enters = self.reference * reference - self.position * position
+        rest = float(self.denominator.sum())
+        size = float(np.abs(self.reference * reference).sum() + np.abs(enters).sum())
+        if torque is None:
+            integrates = abs(rest) <= _CONSISTENT * np.abs(self.denominator).sum()
+            torque = 0.0 if integrates else float(enters.sum()) / rest
+        size += abs(torque) * float(np.abs(self.denominator).sum())
+        terms = enters - self.denominator * torque
+        if abs(terms.sum()) > _CONSISTENT * size:
+            return None
+        return np.cumsum(terms[::-1])[::-1][1:]
+
+    def entering_state(
+        self,
+        reference: np.ndarray,
+        position: np.ndarray,
+        torque: np.ndarray,
+        free: np.ndarray | None = None,
+    ) -> np.ndarray:
+        """Return the state before the first sample that explains a recorded torque best.
+
+        Args:
+            reference: r, (samples,) in rad.
+            position: y, likewise, as the controller saw it.
+            torque: u, likewise in N m.
+            free: bool (samples,), where u is not clamped; None takes it from the limit.
+
+        Returns:
+            float64 (n,), by least squares; exact where the torque follows the law.
+        """
+        free = np.abs(torque) < self.limit_nm if free is None else free
+        left = torque - self.unlimited(reference, position)
+        columns = self.free_responses(torque.size)
+        return np.linalg.lstsq(columns[free], left[free], rcond=None)[0]
+
+    def free_responses(self, samples: int) -> np.ndarray:
+        """Return the torque that follows from each element of the state alone, (samples, n)."""
+        nothing, one = np.zeros(samples), np.ones(1)
+        columns = [lfilter(one, self.denominator, nothing, zi=x)[0] for x in np.eye(self.states)]
+        return np.reshape(columns, (self.states, samples)).T
+
 
 @inlined
-def step(x, error, numerator, denominator, limit):
-    """Advance the controller by one sample (transposed direct form II).
+def step(x, reference, position, numerator, forward, denominator, limit):
+    """Advance the controller by one sample (transposed direct form II, two inputs).
 
     Args:
         x: state, float64 (n + 1,), updated in place; its last element stays zero.
-        error: e = r - y (rad).
-        numerator: of a TransferFunction.
-        denominator: of the same.
+        reference: r (rad).
+        position: y (rad).
+        numerator: with `forward`, `denominator` and `limit` the coefficients of a TransferFunction.
+        forward: see there.
+        denominator: see there.
         limit: torque limit (N m).
 
     Returns:
         torque u (N m).
     """
-    torque = numerator[0] * error + x[0]
+    error = reference - position
+    torque = numerator[0] * error + forward[0] * reference + x[0]
     for i in range(1, x.size):
-        x[i - 1] = numerator[i] * error - denominator[i] * torque + x[i]
+        entered = numerator[i] * error + forward[i] * reference
+        x[i - 1] = entered - denominator[i] * torque + x[i]
     return min(max(torque, -limit), limit)
-
-
-def from_description(controller: Mapping[str, Any]) -> TransferFunction:
-    """Return the law of a `controller` entry of kind transfer_function.
-
-    Raises:
-        InputError: a coefficient that is missing or not a number, or a law that is unstable.
-    """
-    source = "experiment description: controller"
-    b, a = (_coefficients(controller, name, source) for name in ("numerator", "denominator"))
-    if a[0] == 0.0:
-        raise InputError(
-            f"{source}.denominator begins with 0; give it in powers z^0, z^-1, ... as of now."
-        )
-    limit = controller.get("torque_limit_nm")
-    if limit is not None and not (_is_number(limit) and limit > 0.0):
-        raise InputError(f"{source}.torque_limit_nm must be greater than zero or null.")
-    law = TransferFunction.of(b, a, math.inf if limit is None else float(limit))
-    if law.slowest_pole > _OUTSIDE:
-        raise InputError(
-            f"{source}.denominator has a pole of magnitude {law.slowest_pole:.6g} outside the unit "
-            "circle; give both lists in powers z^0, z^-1, ... of the discrete controller."
-        )
-    return law
-
-
-def _coefficients(controller: Mapping[str, Any], name: str, source: str) -> list[float]:
-    values = controller.get(name)
-    if not isinstance(values, (list, tuple)) or not values or not all(map(_is_number, values)):
-        raise InputError(f"{source}.{name} must be a list of finite numbers.")
-    return [float(value) for value in values]
-
-
-def _is_number(value: Any) -> bool:
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        return False
-    return math.isfinite(value)
-
-
-Law = np.ndarray | TransferFunction
-"""A control law that can be simulated: coefficients of `pd_filtered`, or a transfer function."""
-
-
-def law_of(controller: Mapping[str, Any] | None, sample_rate_hz: float) -> Law:
-    """Return the law of the `controller` entry of an experiment description, of any known kind.
-
-    Raises:
-        InputError: there is no such entry, it is of no known kind, or its values are bad.
-    """
-    controller = controller or {}
-    kind = controller.get("kind")
-    if controller.get("unknown"):
-        raise InputError(
-            f"experiment description: controller: {controller['unknown'][0]} is unknown, so the "
-            "law cannot be simulated; give its value."
-        )
-    if kind == KIND:
-        return from_description(controller)
-    if kind == "two_degrees_of_freedom":
-        raise InputError(
-            "experiment description: controller: a law of two degrees of freedom is described but "
-            "not simulated yet; give one from r - y to u."
-        )
-    return pd_filtered.coefficients(pd_filtered.from_description(controller, sample_rate_hz))
-
-
-def as_transfer_function(law: Law) -> TransferFunction:
-    """Return any law as a transfer function."""
-    return law if isinstance(law, TransferFunction) else TransferFunction.of_pd(law)

@@ -2,7 +2,8 @@
 
 Parameters go in, an experiment description and the samples of its reference come out. Begin with
 `multisine` (grid of lines, phases, signal; paper eq. 13); `records` makes chirps, noise, moves and
-steps, which do not repeat; `shaping` is the paper's algorithm 1; `node` streams the reference ahead of the lockstep.
+steps, which do not repeat, `record_experiment` describes them; `shaping` is the paper's algorithm
+1; `node` streams the multisine ahead of the lockstep.
 
     >>> from excitation_node import EXCITATION, describe, reference
     >>> values = EXCITATION.check({"amplitudes_rad": [0.007], "periods": 2, "transient_periods": 1})

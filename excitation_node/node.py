@@ -78,9 +78,7 @@ class ExcitationNode(runtime.RigNode):
         """Create publishers, the pace subscription and the start service."""
         super().__init__("excitation", group)
         self._encode = JointStateWriter("position", self.values["joint"]).encode_many
-        self._reference = self.create_publisher(
-            JointState, topics.REFERENCE.topic, runtime.SIGNAL_QOS
-        )
+        self._reference = self.offer(topics.REFERENCE)
         self.claim(self._reference)
         self._description = self.create_publisher(
             String, topics.EXPERIMENT_TOPIC, runtime.EXPERIMENT_QOS

@@ -26,7 +26,7 @@ def amplitude(
     ] = None,
     rig: Rig = None,
     out: Annotated[
-        Path, typer.Option(metavar="FOLDER", help="Where --graph keeps its bags.")
+        Path, typer.Option(metavar="FOLDER", help="Folder of the bags that --graph records.")
     ] = Path("experiments/amplitude"),
     lowest: Annotated[float, typer.Option(help="Lowest amplitude of a line in rad.")] = 1e-3,
     highest: Annotated[float, typer.Option(help="Highest amplitude of a line in rad.")] = 1e-1,

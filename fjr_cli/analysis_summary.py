@@ -6,8 +6,9 @@ import math
 
 from rich.console import Console
 
+from bla_analyzer.results.findings import between_levels, findings
 from bla_analyzer.results.result import Result
-from bla_analyzer.results.summary import campaign, failed_checks, findings, headline, summarize
+from bla_analyzer.results.summary import campaign, failed_checks, headline, summarize
 from fjr_kit.terminal import print_table
 
 
@@ -20,6 +21,8 @@ def print_summary(result: Result, console: Console) -> None:
         for sentence in findings(level):
             prefix = f"Level {level.level}: " if several else ""
             console.print(f"{prefix}{sentence}", highlight=False, markup=False)
+    for sentence in between_levels(result):
+        console.print(sentence, highlight=False, markup=False)
     for sentence in (*result.notes, *(check.sentence for check in failed_checks(result))):
         console.print(f"Note: {sentence}", highlight=False, markup=False)
 
@@ -28,13 +31,19 @@ def _table(result: Result) -> tuple[list[tuple[str, str]], list[list[str]]]:
     """Return a row for each level: line counts, levels in dB re 1 rad, V of each model."""
     models = [comparison.name for comparison in result.levels[0].comparisons]
     heads = [("level", ""), ("lines", ""), ("95 %\ndisc", "%")]
-    heads += [(name, "dB") for name in ("linear", "odd", "even", "noise")]
+    heads += [(name, "dB") for name in ("linear", "total", "odd", "even", "noise")]
     heads += [(f"V\n{name.removeprefix('G0_')}", "dB\N{SUPERSCRIPT TWO}") for name in models]
     rows = []
     for level in result.levels:
         numbers = summarize(level)
         v = {comparison.name: comparison.v_mean for comparison in level.comparisons}
-        in_db = (numbers.linear_db, numbers.odd_db, numbers.even_db, numbers.noise_db)
+        in_db = (
+            numbers.linear_db,
+            numbers.total_db,
+            numbers.odd_db,
+            numbers.even_db,
+            numbers.noise_db,
+        )
         row = [numbers.name.removeprefix("Level "), str(numbers.lines)]
         row.append(_cell(numbers.radius_percent, ".2g"))
         row += [_cell(value, ".1f") for value in in_db]

@@ -14,7 +14,7 @@ from .record_options import MapSignals, Periods, Resample, SamplesPerPeriod, Tra
 
 if TYPE_CHECKING:
     from fjr_interface.resampling.accuracy import Resampling
-    from fjr_records.experiment_folder import Override
+    from fjr_records.experiment_bag import Override
 
 
 class MethodChoice(str, Enum):
@@ -22,6 +22,7 @@ class MethodChoice(str, Enum):
 
     robust = "robust"
     fast = "fast"
+    local = "local"
 
 
 @reports_errors(kept="nothing was written")
@@ -32,9 +33,13 @@ def analyze(
         typer.Option(metavar="FOLDER", help="Folder of the results; default: FOLDER/analysis."),
     ] = None,
     method: Annotated[
-        MethodChoice,
-        typer.Option(help="robust: over realizations; fast: one realization, by detection lines."),
-    ] = MethodChoice.robust,
+        MethodChoice | None,
+        typer.Option(
+            help="robust: over realizations; fast: one realization, by detection lines; local: "
+            "local polynomials, any excitation. Default: what the excitation allows.",
+            show_default=False,
+        ),
+    ] = None,
     signal_map: MapSignals = None,
     nominal: Annotated[
         str | None,
@@ -55,9 +60,9 @@ def analyze(
         ),
     ] = True,
 ) -> None:
-    """Estimate BLA, noise and nonlinear distortion from bags, and write a report."""
+    """Estimate BLA, noise and nonlinear distortion from bags of any excitation."""
     from fjr_interface.resampling.accuracy import Resampling
-    from fjr_records.experiment_folder import Override
+    from fjr_records.experiment_bag import Override
 
     override = Override(samples_per_period, transient_periods, periods)
     resampling = Resampling.parse(resample) if resample else None
@@ -77,7 +82,7 @@ def analyze(
 def analyze_folder(
     folder: Path,
     out: Path | None = None,
-    method: MethodChoice = MethodChoice.robust,
+    method: MethodChoice | None = None,
     signal_map: Sequence[str] = (),
     nominal: str | None = None,
     override: Override | None = None,
@@ -90,7 +95,7 @@ def analyze_folder(
     Args:
         folder: experiment folder or bag.
         out: folder of the results; None for `analysis` in the experiment folder.
-        method: robust or fast.
+        method: robust, fast or local; None for what the excitation allows.
         signal_map: `signal=/topic:field[joint]` each.
         nominal: as `reference_models` takes it.
         override: what to take instead of the description.
@@ -131,7 +136,7 @@ def analyze_folder(
         progress.describe("reading bags")
         result = analyze(
             folder,
-            method=method.value,
+            method=method.value if method else None,
             signal_map=sources,
             models=models,
             override=override,

@@ -45,7 +45,10 @@ def run(
         ),
     ] = None,
     out: Annotated[
-        Path, typer.Option(metavar="FOLDER", help="Folder of the check; taken up if it is there.")
+        Path,
+        typer.Option(
+            metavar="FOLDER", help="Folder of the check; one that holds a check is resumed."
+        ),
     ] = Path("blind"),
     method: Annotated[
         list[str] | None,

@@ -29,8 +29,8 @@ Levels = Annotated[
     typer.Option("--level", metavar="A", help="Amplitude of each line in rad. Repeatable."),
 ]
 Realizations = Annotated[int | None, typer.Option(help="Phase realizations of each level (M).")]
-Periods = Annotated[int | None, typer.Option(help="Periods kept of each realization (P).")]
-TransientPeriods = Annotated[int | None, typer.Option(help="Periods discarded before those.")]
+Periods = Annotated[int | None, typer.Option(help="Periods to keep of each realization (P).")]
+TransientPeriods = Annotated[int | None, typer.Option(help="Leading periods to discard.")]
 Seed = Annotated[int | None, typer.Option(help="Seed of the grid and of all phases.")]
 Set = Annotated[
     list[str] | None,

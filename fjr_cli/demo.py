@@ -27,7 +27,10 @@ DEMO: dict[str, dict[str, Any]] = {
 @reports_errors(kept="what was recorded is kept, and the same command goes on")
 def demo(
     out: Annotated[
-        Path, typer.Option(metavar="FOLDER", help="Experiment folder; kept and taken up again.")
+        Path,
+        typer.Option(
+            metavar="FOLDER", help="Experiment folder; one that holds the demo already is resumed."
+        ),
     ] = Path("experiments/demo"),
 ) -> None:
     """Run the paper's experiment through the ROS graph, analyze it and write a report.

@@ -1,7 +1,8 @@
-"""`fjr diagnose`: from bags and a nominal model to the cause of the gap and its report."""
+"""`fjr diagnose`: from bags and a nominal model to the causes of the gap and its report."""
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated
 
@@ -34,13 +35,31 @@ def diagnose(
         float,
         typer.Option(min=0.001, max=0.5, help="How far a datasheet value may be off, relative."),
     ] = 0.1,
+    effects: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME,NAME,...", help="Look for these effects only; default: the catalogue."
+        ),
+    ] = None,
+    budget: Annotated[
+        float | None,
+        typer.Option(
+            min=1.0, metavar="SECONDS", help="Try nothing new after so long; what is found counts."
+        ),
+    ] = None,
+    as_record: Annotated[
+        bool,
+        typer.Option(
+            "--as-record", help="Take a periodic experiment as records, from start to end."
+        ),
+    ] = False,
     signal_map: MapSignals = None,
     resample: Resample = None,
     samples_per_period: SamplesPerPeriod = None,
     transient_periods: TransientPeriods = None,
     periods: Periods = None,
 ) -> None:
-    """Tell why rig and simulation differ: where, by which effect, how far it closes the gap."""
+    """Tell why rig and simulation differ: where, by which effects, how far they close the gap."""
     from fjr_kit.installed import require_report_extra
 
     require_report_extra()
@@ -50,11 +69,12 @@ def diagnose(
     from fjr_interface.resampling.accuracy import Resampling
     from fjr_kit.folder_lock import locked_folder
     from fjr_kit.invocation import call_date, command_line
-    from fjr_records.experiment_folder import Override
-    from fjr_records.recorded import read_experiment
-    from gap_diagnosis.investigation import investigate
+    from fjr_records.experiment_bag import Override
+    from fjr_records.recorded import RecordedExperiment
+    from gap_diagnosis.any_record import investigate_any, read_any
     from gap_diagnosis.model.nominal import read_nominal, refuse_wrong_units
-    from gap_diagnosis.report.gap_output import has_known_law, write_diagnosis
+    from gap_diagnosis.report.gap_output import write_diagnosis
+    from gap_diagnosis.report.updated_parameters import has_known_law
 
     from .diagnosis_summary import print_summary
     from .stage_progress import StageProgress
@@ -63,15 +83,26 @@ def diagnose(
     resampling = Resampling.parse(resample) if resample else None
     values = read_nominal(nominal)
     sources = SignalMap.parse(signal_map or [])
+    asked = None if effects is None else [name.strip() for name in effects.split(",")]
     place = out or folder / "diagnosis"
     find_bags(folder)
     with locked_folder(place), StageProgress(transient=True) as progress:
         progress.describe("reading bags")
-        recorded = read_experiment(folder, sources, override=override, resampling=resampling)
-        warning = refuse_wrong_units(recorded, values, nominal)
-        if warning:
-            progress.say(f"Warning: {warning}")
-        found = investigate(recorded, values, tolerance=tolerance, progress=progress.describe)
+        recorded = read_any(
+            folder, sources, override=override, resampling=resampling, as_record=as_record
+        )
+        if isinstance(recorded, RecordedExperiment):
+            warning = refuse_wrong_units(recorded, values, nominal)
+            if warning:
+                progress.say(f"Warning: {warning}")
+        found = investigate_any(
+            recorded,
+            values,
+            tolerance=tolerance,
+            effects=asked,
+            budget_s=math.inf if budget is None else budget,
+            progress=progress.describe,
+        )
         report = write_diagnosis(
             found,
             place,

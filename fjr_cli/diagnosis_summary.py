@@ -9,12 +9,19 @@ from pathlib import Path
 from rich.console import Console
 
 from fjr_kit.terminal import print_table
-from gap_diagnosis.outcome.diagnosis import Diagnosis, Gap
+from gap_diagnosis.outcome.cause_words import (
+    cause_name,
+    digits,
+    evidence_sentences,
+    percent,
+    remainder_sentences,
+    share_words,
+)
+from gap_diagnosis.outcome.diagnosis import Diagnosis
 from gap_diagnosis.outcome.verdict_words import (
     HELD_OUT,
     WORDS,
     closed,
-    explains,
     explanation,
     headline,
     meaning,
@@ -34,13 +41,19 @@ def print_summary(diagnosis: Diagnosis, console: Console, out: Path) -> None:
     _say(console, f"{meaning(diagnosis)} {words.action}")
     for sentence in summaries(diagnosis):
         _say(console, sentence)
+    if diagnosis.causes:
+        print_table(console, *_causes(diagnosis))
     if diagnosis.effects:
         print_table(console, *_parameters(diagnosis), left=("unit",))
-    if diagnosis.gap.nominal is not None:
-        print_table(console, *_gaps(diagnosis))
+    if diagnosis.steps:
+        print_table(console, *_steps(diagnosis))
         if share := closed(diagnosis):
             _say(console, share)
-    if diagnosis.ranking and diagnosis.verdict in ("ambiguous", "unexplained"):
+    if sentences := remainder_sentences(diagnosis):
+        _say(console, f"Remainder: {' '.join(sentences)}")
+    if diagnosis.evidence is not None:
+        _say(console, f"Evidence: {' '.join(evidence_sentences(diagnosis.evidence))}")
+    if _by_misfit(diagnosis) and diagnosis.verdict in ("ambiguous", "unexplained"):
         print_table(console, *_ranking(diagnosis))
     if diagnosis.next_experiment is not None:
         _say(console, f"Next experiment: {diagnosis.next_experiment.description}")
@@ -63,31 +76,43 @@ def _parameters(diagnosis: Diagnosis) -> Content:
     """Return the parameters of the named effects with their 95 % intervals."""
     heads = [("parameter", ""), ("value", ""), ("95 % interval", ""), ("unit", "")]
     rows = [
-        [name, f"{e.value:.4g}", f"{e.low:.4g} to {e.high:.4g}", unit_of(name)]
+        [name, value, f"{low} to {high}", unit_of(name)]
         for name, e in diagnosis.parameters.items()
         if "." in name
+        for value, low, high in [digits(e)]
     ]
     return heads, rows
 
 
-def _gaps(diagnosis: Diagnosis) -> Content:
-    """Return the gap at each stage."""
+def _causes(diagnosis: Diagnosis) -> Content:
+    """Return the named causes, greatest share first."""
+    heads = [("cause", ""), ("present", ""), ("share of the gap (95 %)", "")]
+    rows = [
+        [cause_name(cause), percent(cause.present), share_words(cause.share)]
+        for cause in diagnosis.causes
+    ]
+    return heads, rows
+
+
+def _steps(diagnosis: Diagnosis) -> Content:
+    """Return the gap from step to step."""
     gap = f"{HELD_OUT[diagnosis.reported_on]} gap"
     heads = [(gap, ""), ("position", "%"), ("torque", "%"), ("misfit/dof", "")]
-    stages: dict[str, Gap | None] = {
-        "nominal": diagnosis.gap.nominal,
-        "refit": diagnosis.gap.refit,
-    }
-    if explains(diagnosis):
-        name = explanation(diagnosis.effects) if diagnosis.effects else "best explanation"
-        stages[f"with {name}" if diagnosis.effects else name] = diagnosis.gap.explained
-    stages["noise floor"] = diagnosis.gap.noise_floor
     rows = []
-    for name, gap_there in stages.items():
-        if gap_there is not None:
-            shares = [_percent(gap_there.nrmse_position), _percent(gap_there.nrmse_torque)]
-            rows.append([name, *shares, _number(gap_there.chi2_per_dof)])
+    for step in diagnosis.steps:
+        name = f"with {explanation([step.added])}" if step.added else step.stage
+        shares = [_percent(step.nrmse_position), _percent(step.nrmse_torque)]
+        rows.append([name, *shares, _number(step.chi2_per_dof)])
+    floor = diagnosis.gap.noise_floor
+    if floor is not None:
+        shares = [_percent(floor.nrmse_position), _percent(floor.nrmse_torque)]
+        rows.append(["noise floor", *shares, _number(floor.chi2_per_dof)])
     return heads, rows
+
+
+def _by_misfit(diagnosis: Diagnosis) -> bool:
+    """Tell whether explanations are ranked by their misfit, as those of steady periods are."""
+    return any(candidate.held_out_chi2 is not None for candidate in diagnosis.ranking)
 
 
 def _ranking(diagnosis: Diagnosis) -> Content:

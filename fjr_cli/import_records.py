@@ -32,7 +32,8 @@ def import_records(
         ),
     ],
     out: Annotated[
-        Path | None, typer.Option(help="Experiment folder to make; not with --dry-run.")
+        Path | None,
+        typer.Option(metavar="FOLDER", help="New experiment folder; needed without --dry-run."),
     ] = None,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Show what is understood of the files; write nothing.")
@@ -52,9 +53,7 @@ def import_records(
         ),
     ] = None,
     samples_per_period: SamplesPerPeriod = None,
-    transient_periods: Annotated[
-        int, typer.Option(min=0, help="Leading periods that are transient.")
-    ] = 1,
+    transient_periods: Annotated[int, typer.Option(min=0, help="Leading periods to discard.")] = 1,
     periods: Periods = None,
     repeat_reference: Annotated[
         bool,
@@ -78,7 +77,6 @@ def import_records(
     levels: Annotated[int, typer.Option(min=1, help="Amplitudes that the files hold.")] = 1,
 ) -> None:
     """Turn records of a rig without ROS into bags that every command reads."""
-    from fjr_interface.experiment import Experiment
     from fjr_kit.errors import InputError
     from fjr_records.importers.import_map import parse_harmonics, parse_map
     from fjr_records.importers.importer import read_files, write_bags
@@ -112,13 +110,6 @@ def import_records(
     if dry_run or out is None:
         typer.echo("Nothing was written. Next: the same command with --out FOLDER, no --dry-run.")
         return
-    bags = write_bags(understood, out)
-    if isinstance(understood.descriptions[0], Experiment):
-        method = "" if len(bags) > 1 else " --method fast"
-        typer.echo(f"Next: fjr analyze {out}{method}")
-    else:
-        typer.echo(
-            f"Next: ros2 bag play {bags[0]}, or open the bags in PlotJuggler; analysis and "
-            "diagnosis of records that do not repeat are not there yet."
-        )
+    write_bags(understood, out)
+    typer.echo(f"Next: fjr analyze {out}")
     typer.echo(out)

@@ -14,7 +14,11 @@ from .worker_options import Dask, Workers
 @reports_errors(kept="what is finished is kept, and the same command goes on")
 def paper(
     out: Annotated[
-        Path, typer.Option(metavar="FOLDER", help="Folder of report, figures and results.")
+        Path,
+        typer.Option(
+            metavar="FOLDER",
+            help="Folder of report, figures and results; one that holds results is resumed.",
+        ),
     ] = Path("experiments/paper"),
     quick: Annotated[
         bool, typer.Option("--quick", help="Fewer realizations: a first look within minutes.")

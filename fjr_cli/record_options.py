@@ -35,5 +35,5 @@ Periods = Annotated[
 ]
 TransientPeriods = Annotated[
     int | None,
-    typer.Option(min=0, help="Periods to discard; default: as described, or found."),
+    typer.Option(min=0, help="Leading periods to discard; default: as described, or found."),
 ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from dataclasses import dataclass
 from typing import Literal
 
@@ -65,6 +66,15 @@ is not part of the experiment description either."""
 RECORDED_TOPIC = "recorded"
 """Stamp up to which a recorder has everything; the excitation never streams further than a window
 beyond it, so a slow recorder slows the lockstep instead of losing samples."""
+
+
+_CLOCK = struct.Struct("<4siI")
+_CDR = b"\x00\x01\x00\x00"
+
+
+def clock_message(stamp_ns: int) -> bytes:
+    """Return the CDR bytes of a rosgraph_msgs/Clock that says a stamp (ns)."""
+    return _CLOCK.pack(_CDR, *divmod(stamp_ns, 1_000_000_000))
 
 
 def stamp_ns(sample: int, sample_rate_hz: float) -> int:

@@ -27,6 +27,10 @@ SETTLED = 0.01
 _MEND = "give period_samples, or add an experiment description"
 
 
+class NoPeriodError(InputError):
+    """The signals show no period, or no lines that stand out."""
+
+
 @dataclass(frozen=True)
 class Found:
     """What the signals themselves tell.
@@ -71,8 +75,8 @@ def discover(
         period_samples: N, if it is known.
 
     Raises:
-        InputError: the reference is constant, does not repeat, its period is not a whole number of
-            samples, or its lines do not stand out.
+        NoPeriodError: the reference is constant, does not repeat, its period is not a whole number
+            of samples, or its lines do not stand out.
     """
     period = period_samples or find_period(name, reference)
     count = reference.size // period
@@ -98,12 +102,12 @@ def find_period(name: str, reference: np.ndarray) -> int:
     """
     x = reference - reference.mean()
     if not x.any():
-        raise InputError(f"{name}: the reference is constant; map the topic that carries it.")
+        raise NoPeriodError(f"{name}: the reference is constant; map the topic that carries it.")
     candidates = _peaks(x)
     difference = np.array([_difference(x, lag) for lag in candidates])
     best = difference.min(initial=np.inf)
     if best > REPEATS:
-        raise InputError(
+        raise NoPeriodError(
             f"{name}: the reference does not repeat within {x.size} samples; record two or more "
             f"periods, or {_MEND}."
         )
@@ -115,8 +119,8 @@ def find_period(name: str, reference: np.ndarray) -> int:
     return period
 
 
-def _not_whole(name: str, period: float) -> InputError:
-    return InputError(
+def _not_whole(name: str, period: float) -> NoPeriodError:
+    return NoPeriodError(
         f"{name}: the period of the reference is about {period:.2f} samples, which is not a whole "
         "number; choose sample rate and base frequency so that it is, or resample."
     )
@@ -164,7 +168,7 @@ def find_lines(name: str, period: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     ranked = np.sort(np.maximum(level, 1e-9 * level.max(initial=0.0)))[::-1]
     ratio = ranked[:-1] / ranked[1:]
     if ratio.max(initial=1.0) < LINE_GAP:
-        raise InputError(
+        raise NoPeriodError(
             f"{name}: no excited lines stand out in the spectrum of the reference; add an "
             "experiment description."
         )

@@ -13,7 +13,8 @@ from fjr_interface.experiment import Experiment
 from fjr_interface.resampling.accuracy import Resampling
 from fjr_kit.errors import InputError
 
-from .experiment_folder import ExperimentBag, Override, open_experiment
+from .experiment_bag import ExperimentBag, Override
+from .experiment_folder import open_experiment
 from .records import reference_optional
 from .spectra import line_spectrum
 
@@ -160,4 +161,3 @@ def _cut(bag: ExperimentBag) -> RecordedRealization:
     )
     assert torque is not None and position is not None  # no bag is read without them
     return RecordedRealization(bag.name, bag.experiment, reference, torque, position, link)
-

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import struct
 import time
 
 from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
@@ -43,8 +41,6 @@ PARAMETERS = ParameterGroup(
 )
 
 _LOOK_SAMPLES = 100  # between two looks for subscribers of link_position
-_CLOCK = struct.Struct("<4siI")
-_CDR = b"\x00\x01\x00\x00"
 
 
 class SimulatorNode(runtime.RigNode):
@@ -72,20 +68,11 @@ class SimulatorNode(runtime.RigNode):
         self.finished: str | None = None
         self._speed = Speed()
         self._ticks = self.create_publisher(Clock, "/clock", runtime.CLOCK_QOS)
-        self._position = self.create_publisher(
-            JointState, topics.MOTOR_POSITION.topic, runtime.SIGNAL_QOS
-        )
+        self._position = self.offer(topics.MOTOR_POSITION)
         self.claim(self._position)
-        self._link = self.create_publisher(
-            JointState, topics.LINK_POSITION.topic, runtime.SIGNAL_QOS
-        )
-        self._torque = self.create_subscription(
-            JointState,
-            topics.MOTOR_TORQUE.topic,
-            self._on_torque_in_real_time if self.real_time else self._on_torque,
-            runtime.SIGNAL_QOS,
-            raw=True,
-        )
+        self._link = self.offer(topics.LINK_POSITION)
+        on_torque = self._on_torque_in_real_time if self.real_time else self._on_torque
+        self._torque = self.hear(topics.MOTOR_TORQUE, on_torque)
         self._description = self.create_subscription(
             String, topics.EXPERIMENT_TOPIC, self._on_experiment, runtime.EXPERIMENT_QOS
         )
@@ -200,7 +187,7 @@ class SimulatorNode(runtime.RigNode):
 
     def _publish_position(self, stamp: int, position: float) -> None:
         self._position.publish(self._encode(stamp, position))
-        self._ticks.publish(_CLOCK.pack(_CDR, *divmod(stamp, 1_000_000_000)))
+        self._ticks.publish(topics.clock_message(stamp))
 
     def _on_torque(self, message: bytes) -> None:
         stamp, torque = self._decoded(message)

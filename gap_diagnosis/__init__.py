@@ -1,10 +1,12 @@
 """The sim-to-real gap: where it lies, which unmodelled effect causes it, how far it shrinks.
 
 A recorded experiment and a nominal (datasheet) go in, an `outcome.diagnosis.Diagnosis` and its
-report come out. Begin with `investigation`, which leads through the stages: `gates` (is the record
-fit for a diagnosis?), `where` (residual maps), `which` (fits of effects, their attribution),
-`how_far` (the gap held out from the fits), `next_experiment`, `report`. All simulate through
-`model`. `judgement` and `notes` draw the verdict from what the stages found.
+report come out. `any_record` chooses the way: steady periods go through `investigation`, whatever
+does not repeat through `record_investigation`. Both lead through the stages: `gates` (are periods
+fit for a diagnosis?), `where` (residual maps, what a remainder looks like), `which` (fits of
+effects, their attribution), `how_far` (the gap held out from the fits), `next_experiment`,
+`report`. All simulate through `model`. `judgement` and `record_judgement` draw the verdict from
+what the stages found.
 
     >>> from gap_diagnosis import diagnose, read_nominal
     >>> diagnosis = diagnose("rig", read_nominal("paper"))
@@ -19,9 +21,11 @@ from typing import TYPE_CHECKING
 from fjr_kit.public_names import deferred_names
 
 if TYPE_CHECKING:
-    from .investigation import Investigation, diagnose, investigate
+    from .any_record import diagnose
+    from .investigation import Investigation, investigate
     from .model.nominal import read_nominal
     from .outcome.diagnosis import Diagnosis
+    from .record_investigation import RecordInvestigation, investigate_records
     from .report.gap_output import write_diagnosis
 else:
     __getattr__, __dir__ = deferred_names(__name__)
@@ -29,8 +33,10 @@ else:
 __all__ = [
     "Diagnosis",
     "Investigation",
+    "RecordInvestigation",
     "diagnose",
     "investigate",
+    "investigate_records",
     "read_nominal",
     "write_diagnosis",
 ]

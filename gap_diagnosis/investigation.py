@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 
 from fjr_records.encoder_step import position_step
 from fjr_records.noise import NoiseLevels, even_lines_as_noise
-from fjr_records.recorded import RecordedExperiment, read_experiment
+from fjr_records.recorded import RecordedExperiment
 
 from .gates.bags_gate import with_bags_gate
 from .gates.gate_checks import GateReport, check_gates
@@ -19,9 +20,11 @@ from .judgement import judge, stopped
 from .model.misfit import Misfit
 from .model.simulated_rig import Model, Signals, Simulator
 from .outcome.diagnosis import Diagnosis
+from .outcome.verdict_words import ROUNDING
 from .where.residual_map import ResidualMap, residual_map
 from .where.residual_torque import ResidualTorque, residual_torque
 from .which.attribution import Attribution
+from .which.catalogue import catalogue
 from .which.fits import Fitter
 from .which.rounding import widened, with_rounding
 from .which.search import Search
@@ -73,51 +76,33 @@ class Investigation:
         return {k: residual_torque(self.recorded, f.model, self.noise) for k, f in fits.items()}
 
 
-def diagnose(
-    folder: Path | str,
-    nominal: Mapping[str, float],
-    *,
-    tolerance: float = TOLERANCE,
-    progress: Progress = lambda _: None,
-) -> Diagnosis:
-    """Diagnose the gap between the rig that recorded a folder of bags and its nominal simulation.
-
-    Args:
-        folder: experiment folder of bags.
-        nominal: datasheet values of the bare plant's parameters in SI units, by the names of
-            `fjr_sim_node.plant.PLANT`; `read_nominal` reads them from a parameter file.
-        tolerance: how far a datasheet value may be off, relative.
-        progress: told which stage begins.
-
-    Returns:
-        The diagnosis; `investigate` returns its evidence as well, for `write_diagnosis`.
-
-    Raises:
-        InputError: damaged bags, bags of different rigs, or a controller of an unknown kind.
-    """
-    recorded = read_experiment(folder)
-    return investigate(recorded, nominal, tolerance=tolerance, progress=progress).diagnosis
-
-
 def investigate(
     recorded: RecordedExperiment,
     nominal: Mapping[str, float],
     *,
     tolerance: float = TOLERANCE,
+    effects: Sequence[str] | None = None,
+    budget_s: float = math.inf,
     progress: Progress = lambda _: None,
 ) -> Investigation:
-    """Diagnose a recorded experiment and keep all the evidence.
+    """Diagnose an experiment of steady periods and keep all the evidence.
 
     Args:
         recorded: the experiment, from `fjr_records.read_experiment`.
-        nominal: as for `diagnose`.
-        tolerance: as for `diagnose`.
-        progress: as for `diagnose`.
+        nominal: datasheet values of the bare plant's parameters in SI units, by the names of
+            `fjr_sim_node.plant.PLANT`; `read_nominal` reads them from a parameter file.
+        tolerance: how far a datasheet value may be off, relative.
+        effects: identifiers to look for; None for all.
+        budget_s: time after which no effect is added any more.
+        progress: told which stage begins.
 
     Raises:
-        InputError: bags of different rigs, or a controller of an unknown kind.
+        InputError: bags of different rigs, a controller of an unknown kind, or an effect of an
+            unknown name.
     """
+    until = time.monotonic() + budget_s
     model = Model.nominal(nominal)
+    catalogue(model.plant, effects)
     progress("gates")
     simulator = Simulator(recorded)
     noise = simulator.noise(model)
@@ -129,9 +114,9 @@ def investigate(
         return Investigation(recorded, model, gates, noise, held, {}, {}, None, diagnosis)
     std, step = _noise_std(recorded, noise), position_step(recorded)
     seen = std if step is None else widened(std, step, recorded.experiment.samples_per_period)
-    fitter = Fitter(recorded, simulator, seen, model.plant, train, held, tolerance)
-    attribution = Search(fitter, progress).run()
-    if step is not None:
+    fitter = Fitter(recorded, simulator, seen, model.plant, train, held, tolerance, effects)
+    attribution = Search(fitter, progress, until).run()
+    if step is not None and (effects is None or ROUNDING in effects):
         plain = Misfit(recorded, simulator, std, train), Misfit(recorded, simulator, std, held)
         attribution = with_rounding(attribution, plain, step)
     progress("judgement")
@@ -143,7 +128,10 @@ def investigate(
     }
     signals = {name: simulator.signals(each) for name, each in models.items()}
     maps = {name: residual_map(recorded, noise, *simulated) for name, simulated in signals.items()}
-    diagnosis = judge(recorded, std, gates, fitter, attribution, signals, maps, held_out=held_out)
+    diagnosis = judge(
+        recorded, std, gates, fitter, attribution, signals, maps, held_out=held_out,
+        known_noise=noise is not None,
+    )  # fmt: skip
     return Investigation(recorded, model, gates, noise, held, signals, maps, attribution, diagnosis)
 
 

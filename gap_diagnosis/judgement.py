@@ -10,6 +10,7 @@ from fjr_records.recorded import RecordedExperiment
 
 from .gates.gate_checks import GateReport
 from .how_far.held_out_gap import held_out_gap
+from .how_far.steps import causes, evidence_kind, steps
 from .model.simulated_rig import Model, Signals
 from .next_experiment.choice import next_experiment
 from .notes import notes, rounding
@@ -35,6 +36,7 @@ def judge(
     maps: Mapping[str, ResidualMap],
     *,
     held_out: bool,
+    known_noise: bool,
 ) -> Diagnosis:
     """Return the diagnosis of an experiment whose search has ended.
 
@@ -47,6 +49,7 @@ def judge(
         signals: simulated by each stage's model: nominal, refit, explained.
         maps: residual map of each stage.
         held_out: whether the data that the fits are judged by are such that no fit has seen.
+        known_noise: whether the noise was seen between periods.
     """
     best, refit = attribution.best, attribution.refit
     held, size = fitter.held.which, fitter.held.size
@@ -75,7 +78,8 @@ def judge(
             effects=named,
             equivalent=_equivalents(attribution) if named else [],
             confidence=0.0,
-            reported_on="records" if held_out else "none",
+            evidence=evidence_kind(recorded, known_noise=known_noise, held_out=held_out),
+            steps=steps(gaps, named),
             gap=gaps,
             gap_closed=None if closed is None else closed.value,
             gap_figures=figures,
@@ -97,8 +101,9 @@ def stopped(verdict: Verdict, gates: GateReport) -> Diagnosis:
 
 
 def _sure(diagnosis: Diagnosis) -> Diagnosis:
-    """Return a diagnosis with its confidence, which follows from its other fields."""
-    return diagnosis.model_copy(update={"confidence": confidence(diagnosis)})
+    """Return a diagnosis with its confidence and causes, which follow from its other fields."""
+    sure = diagnosis.model_copy(update={"confidence": confidence(diagnosis)})
+    return sure.model_copy(update={"causes": causes(sure)})
 
 
 def _next(

@@ -16,6 +16,7 @@ NOT_HELD_OUT = (
     "itself, no prediction was tested, and the confidence is at most "
     f"{UNTESTED:.0%}; record two or more realizations of each level."
 )
+OUT_OF_TIME = "The time budget ended the search before all effects were tried."
 
 
 def notes(
@@ -42,6 +43,8 @@ def notes(
     found = [gate.sentence for gate in gates.failures] + list(gates.notes)
     if not held_out:
         found.append(NOT_HELD_OUT)
+    if not attribution.complete:
+        found.append(OUT_OF_TIME)
     failed = [" + ".join(fit.effects) for fit in attribution.candidates if not fit.converged]
     if failed:
         found.append(f"Dropped or not converged, so not ranked: {', '.join(failed)}.")

@@ -21,12 +21,21 @@ APART = {"k0": 0.0, "k1": 0.0}
 CONTROLLER = pd_filtered.coefficients(pd_filtered.CONTROLLER.defaults())
 
 MODERATE = {
+    "coulomb_friction": {"motor_nm": 2.0, "link_nm": 1.0},
+    "viscous_friction": {"motor_nm_s_rad": 1.0, "link_nm_s_rad": 0.5},
     "stribeck_friction_motor": {"torque_nm": 2.0, "velocity_rad_s": 0.05},
     "stribeck_friction_link": {"torque_nm": 2.0, "velocity_rad_s": 0.05},
     "asymmetric_friction": {"coulomb_nm": 1.0, "viscous_nm_s_rad": 0.5},
     "torque_bias": {"torque_nm": 1.0},
     "presliding_friction": {"motor_rad": 1e-3, "link_rad": 5e-4},
     "load_friction": {"coefficient": 0.1},
+    "lugre_friction": {
+        "stribeck_nm": 2.0,
+        "bristle_nm_rad": 6e3,
+        "velocity_rad_s": 0.05,
+        "damping_nm_s_rad": 5.0,
+    },
+    "directional_loss": {"forward": 0.1, "backward": 0.03},
     "position_friction": {
         "amplitude_nm": 2.0,
         "cycles_per_turn": 50.0,
@@ -37,6 +46,7 @@ MODERATE = {
     "quadratic_friction": {"motor_nm_s2_rad2": 2.0, "link_nm_s2_rad2": 2.0},
     "backlash": {"half_gap_rad": 1e-3},
     "piecewise_stiffness": {"zone_rad": 2e-3, "soft_ratio": 0.4},
+    "asymmetric_stiffness": {"relative": 0.2},
     "hysteresis": {"torque_nm": 3.0, "displacement_rad": 1e-3},
     "transmission_damping": {"nm_s_rad": 2.0},
     "kinematic_error": {
@@ -48,6 +58,12 @@ MODERATE = {
     },
     "extra_mode": {"inertia_kg_m2": 0.03, "frequency_hz": 30.0, "damping_ratio": 0.02},
     "gravity": {"torque_nm": 3.0, "angle_rad": 0.5},
+    "transmission_stiffness": {
+        "compliance_rad_nm": 1e-3,
+        "link_inertia_share": 0.6,
+        "link_coulomb_share": 0.4,
+        "link_viscous_share": 0.6,
+    },
     "cogging": {
         "amplitude_nm": 1.0,
         "cycles_per_turn": 24.0,
@@ -58,6 +74,16 @@ MODERATE = {
     "delay": {"time_s": 5e-4},
     "actuator_lag": {"time_constant_s": 1e-3},
     "torque_saturation": {"limit_nm": 30.0},
+    "torque_speed_limit": {"stall_nm": 30.0, "no_load_rad_s": 30.0},
+    "torque_slew_limit": {"limit_nm_s": 3e5},
+    "dead_band": {"width_nm": 0.5},
+    "torque_constant_ripple": {
+        "amplitude": 0.1,
+        "cycles_per_turn": 24.0,
+        "phase_rad": 0.3,
+        "second_ratio": 0.4,
+        "second_phase_rad": 0.9,
+    },
     "torque_gain": {"relative_error": 0.05},
     "encoder_quantization": {"resolution_rad": 1e-5},
     "encoder_eccentricity": {"amplitude_rad": 1e-3, "phase_rad": 0.3},
@@ -71,12 +97,18 @@ def named(identifier: str, **values: float) -> dict[str, float]:
     return {f"{identifier}.{name}": value for name, value in values.items()}
 
 
-def moderate(*identifiers: str) -> tuple[float, ...] | None:
-    """Return the coefficients with these effects at a moderate size."""
+def moderate(*identifiers: str) -> dict[str, float]:
+    """Return the parameters of these effects at a moderate size."""
     together: dict[str, float] = {}
     for identifier in identifiers:
         together |= named(identifier, **MODERATE[identifier])
-    return effects.coefficients(together)
+    return together
+
+
+def axis(*identifiers: str) -> dict[str, float]:
+    """Return what makes an axis one that can have these effects: rigid, where only such can."""
+    flexible = all(effects.EFFECTS[identifier].on_flexible_axis for identifier in identifiers)
+    return {} if flexible else {"k0": math.inf}
 
 
 @dataclass
@@ -95,8 +127,10 @@ class Rig:
     x: np.ndarray = field(default_factory=rig.at_rest)
 
     def __post_init__(self) -> None:
-        self.values = plant.PLANT.check(self.plant)
-        self.p = plant.coefficients(self.values)
+        given = {**plant.PLANT.check(self.plant), **self.effects}
+        self.values = plant.with_added(given)
+        self.one_body = plant.moves_as_one(given)
+        self.p = plant.coefficients(given)
         self.e = effects.coefficients(self.effects)
 
     def start(self, q=0.0, vq=0.0, th=0.0, vth=0.0) -> Rig:
@@ -121,6 +155,8 @@ class Rig:
         e = effects.DEFAULTS if self.e is None else self.e
         get = dict(zip(effects.NAMES, e, strict=True)).__getitem__
         q, vq, th, vth, q3, v3, _, link, motor, flex = self.x[:10]
+        if self.one_body:
+            q, vq, v = th, vth, {**v, "k0": 0.0, "k1": 0.0}
         rate = 2.0 * math.pi * get("extra_mode.frequency_hz")
         third = 0.5 * get("extra_mode.inertia_kg_m2") * (v3**2 + (rate * (q3 - q)) ** 2)
         ripple, cycles = get("cogging.amplitude_nm"), get("cogging.cycles_per_turn")
@@ -149,16 +185,36 @@ class Rig:
             + get("stribeck_friction_motor.torque_nm")
             + get("position_friction.amplitude_nm") * second
             + abs(get("asymmetric_friction.coulomb_nm"))
+            + get("lugre_friction.stribeck_nm")
         )
+        lugre = get("lugre_friction.bristle_nm_rad")
+        if lugre != math.inf:
+            highest_motor, distance = lugre, 1.0
+        else:
+            distance = get("presliding_friction.motor_rad")
         sides = (
             (link, highest_link, get("presliding_friction.link_rad")),
-            (motor, highest_motor, get("presliding_friction.motor_rad")),
+            (motor, highest_motor, distance),
         )
         return sum(
             0.5 * torque**2 * distance / highest
             for torque, highest, distance in sides
             if distance and highest
         )
+
+    def work(self, torque: float) -> float:
+        """Return the work that a held command has done at the present motor angle (J)."""
+        get = {**dict(zip(effects.NAMES, effects.DEFAULTS, strict=True)), **self.effects}.get
+        given = math.copysign(max(abs(torque) - get("dead_band.width_nm"), 0.0), torque)
+        given *= 1.0 + get("torque_gain.relative_error")
+        th, cycles = self.x[2], get("torque_constant_ripple.cycles_per_turn")
+        angle = cycles * th + get("torque_constant_ripple.phase_rad")
+        second = get("torque_constant_ripple.second_ratio") / 2.0
+        turned = -math.cos(angle) - second * math.cos(
+            2.0 * angle + get("torque_constant_ripple.second_phase_rad")
+        )
+        ripple = get("torque_constant_ripple.amplitude") * turned / cycles
+        return given * (th + ripple) + get("torque_bias.torque_nm") * th
 
 
 def twist(q, th, get) -> float:
@@ -172,8 +228,11 @@ def twist(q, th, get) -> float:
 def spring_energy(d, v, get) -> float:
     """Return the energy of the transmission's spring behind gap and soft zone (J)."""
 
+    side = 1.0 if d > 0.0 else -1.0
+    stiffness = v["k0"] * (1.0 + side * get("asymmetric_stiffness.relative"))
+
     def held(reduced):
-        return 0.5 * v["k0"] * reduced**2 + 0.25 * v["k1"] * reduced**4
+        return 0.5 * stiffness * reduced**2 + 0.25 * v["k1"] * reduced**4
 
     d = max(abs(d) - get("backlash.half_gap_rad"), 0.0)
     zone, ratio = get("piecewise_stiffness.zone_rad"), get("piecewise_stiffness.soft_ratio")
@@ -191,12 +250,15 @@ def multisine_reference(amplitude: float, seed: int = 1) -> np.ndarray:
     return multisine.reference(multisine.describe(values, 0, 0))
 
 
-def simulate(reference, e, elapsed_s=0.0, noise=None, **plant_values):
-    """Simulate the paper's loop with effects."""
+def simulate(reference, on, elapsed_s=0.0, noise=None, **plant_values):
+    """Simulate the paper's loop with effects: parameters by full name, or coefficients, or None."""
+    bare, e = plant.PLANT.check(plant_values), on
+    if isinstance(on, dict):
+        bare, e = bare | on, effects.coefficients(on)
     return closed_loop.simulate(
         reference,
         RATE,
-        plant.coefficients(plant.PLANT.check(plant_values)),
+        plant.coefficients(bare),
         CONTROLLER,
         noise,
         e,

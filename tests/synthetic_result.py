@@ -71,6 +71,7 @@ def _estimate(frequency, u, y, periods) -> BlaEstimate:
         var_nonlinear=m * (total - noise),
         nonlinear_p_value=p_value,
         radius_95=np.sqrt(total * f_distribution.ppf(0.95, 2, 2 * (m - 1))),
+        coherence=abs(g) ** 2 / (abs(g) ** 2 + m * total),
         input_relative_variance=relative,
         reliable=relative < 0.01,
     )
@@ -158,6 +159,7 @@ def make_level(level=0, amplitude=7e-3, periods=P, seed=1) -> LevelResult:
         excited=excited,
         odd=_lines(odd_hz, 0.0, distortion * _rolloff(odd_hz), noise_p, generator),
         even=_lines(even_hz, 0.0, 0.0, noise_p, generator),
+        left_out_hz=np.empty(0),
         comparisons=(
             _comparison("G0_viscous", "ZOH equivalent, viscous friction", bla, g0),
             _comparison("G0_paper", "as printed in eqs. 6-7", bla, two_mass(frequency, 9.0, 8.0)),
@@ -182,6 +184,7 @@ def make_result(amplitudes=(1e-3, 7e-3, 3e-2), periods=P, checks=None, **changes
     levels = tuple(make_level(i, a, periods) for i, a in enumerate(amplitudes))
     values = {
         "source": "campaigns/two_mass",
+        "excitation": "periodic",
         "sample_rate_hz": RATE,
         "samples_per_period": PERIOD,
         "periods": periods,

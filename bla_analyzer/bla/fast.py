@@ -13,7 +13,7 @@ from ..distortion.local_power import local_power
 from ..distortion.resonant_poles import resonant_poles, resonant_power
 from ..distortion.third_order import third_order_power
 from ..results.result import BlaEstimate
-from .robust import INPUT_VARIANCE_LIMIT, confidence_radius, f_test
+from .robust import INPUT_VARIANCE_LIMIT, coherence, confidence_radius, f_test
 
 NEIGHBOURS = 8
 """Odd detection lines that tell the distortion at an excited line: some sixteen degrees of freedom,
@@ -76,6 +76,7 @@ def fast_bla(
         var_nonlinear=var_total - var_noise,
         nonlinear_p_value=p_value,
         radius_95=radius,
+        coherence=coherence(g, var_total),
         input_relative_variance=var_input,
         reliable=var_input <= INPUT_VARIANCE_LIMIT,
     )

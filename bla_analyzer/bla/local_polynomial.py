@@ -158,6 +158,7 @@ def local_polynomial_bla(
         var_nonlinear=unknown,
         nonlinear_p_value=unknown,
         radius_95=confidence_radius(var_total, freedom),
+        coherence=unknown,
         input_relative_variance=var_input,
         reliable=var_input <= INPUT_VARIANCE_LIMIT,
     )

@@ -57,6 +57,7 @@ def robust_bla(spectra: Sequence[RealizationSpectra], excited: np.ndarray) -> Bl
         var_nonlinear=count * (var_total - var_noise),
         nonlinear_p_value=f_test(var_total, var_noise, 2 * (count - 1), 2 * count * (periods - 1)),
         radius_95=confidence_radius(var_total, count - 1),
+        coherence=coherence(g, count * var_total),
         input_relative_variance=var_input,
         reliable=var_input <= INPUT_VARIANCE_LIMIT,
     )
@@ -74,7 +75,7 @@ def turned(
 
 
 def confidence_radius(
-    variance: np.ndarray, degrees: np.ndarray | int, level: float = 0.95
+    variance: np.ndarray, degrees: np.ndarray | float, level: float = 0.95
 ) -> np.ndarray:
     """Return the radius of the confidence disc of a circular complex estimate.
 
@@ -89,8 +90,17 @@ def confidence_radius(
     return np.sqrt(variance * degrees * ((1.0 - level) ** (-1.0 / degrees) - 1.0))
 
 
+def coherence(g: np.ndarray, var_one: np.ndarray) -> np.ndarray:
+    """Return the squared coherence of Y and G U, `var_one` the variance of one Y/U, (F,)."""
+    power = np.abs(g) ** 2
+    return np.asarray(power / (power + var_one))
+
+
 def f_test(
-    numerator: np.ndarray, denominator: np.ndarray, degrees: int, degrees_denominator: int
+    numerator: np.ndarray,
+    denominator: np.ndarray,
+    degrees: np.ndarray | int,
+    degrees_denominator: np.ndarray | int,
 ) -> np.ndarray:
     """Return the p-value of a ratio of variances against F(degrees, degrees_denominator).
 

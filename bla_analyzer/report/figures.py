@@ -29,7 +29,15 @@ from fjr_kit.figure_style import (
 )
 
 from ..results.result import BlaEstimate, LevelResult, LineLevels, Result
-from ..results.summary import bla_phase_deg, decibel, level_name, phase_deg, signal_at, significant
+from ..results.summary import (
+    bla_phase_deg,
+    decibel,
+    level_name,
+    phase_deg,
+    signal_at,
+    significant,
+    total_distortion,
+)
 from .figures_overview import draw_checks, draw_levels
 
 Draw = Callable[[], Figure]
@@ -52,8 +60,9 @@ def _figures(result: Result) -> Iterator[tuple[str, Draw]]:
         stem = f"level_{level.level}"
         if level.bla is not None:
             yield f"{stem}_bla", partial(draw_bla, level, level.bla)
-        yield f"{stem}_spectra", partial(draw_spectra, level)
-        yield f"{stem}_distortion", partial(draw_distortion, level)
+        if level.excited.frequency_hz.size:
+            yield f"{stem}_spectra", partial(draw_spectra, level)
+            yield f"{stem}_distortion", partial(draw_distortion, level)
     if len(result.levels) > 1:
         yield "levels", partial(draw_levels, result)
     if result.checks:
@@ -157,6 +166,10 @@ def draw_distortion(level: LevelResult) -> Figure:
             axis.plot(lines.frequency_hz, decibel(lines.corrected), **(style | {"alpha": 0.35}))
             smooth: Style = {"color": style["color"], "zorder": style["zorder"] + 1.5}
             axis.plot(lines.frequency_hz, decibel(lines.smoothed), label=name, **smooth)
+    total = decibel(total_distortion(level))
+    if np.isfinite(total).any():
+        name = "distortion and noise\nat excited lines"
+        axis.plot(f, total, "D", ms=2.2, color=NONLINEAR, label=name)
     _draw_noise(axis, (level.excited, level.odd, level.even))
     axis.set_ylabel("position (dB re 1 rad)")
     frequency_axis([axis], f)

@@ -58,7 +58,12 @@ def _shades(count: int) -> list[tuple[float, ...]]:
 
 def _amplitudes(result: Result) -> np.ndarray:
     """Return the rms over lines of the reference amplitude of each level (rad)."""
-    return np.array([np.sqrt(np.mean(level.amplitude_rad**2)) for level in result.levels])
+    return np.array(
+        [
+            np.sqrt(np.mean(level.amplitude_rad**2)) if level.amplitude_rad.size else np.nan
+            for level in result.levels
+        ]
+    )
 
 
 def _draw_v(axis: Axes, result: Result) -> None:

@@ -8,8 +8,9 @@ from typing import Any
 
 from fjr_kit.page import Cell, Mark, Row, render_page
 
+from ..results.findings import all_findings
 from ..results.result import BlaEstimate, Result
-from ..results.summary import campaign, failed_checks, findings, headline, level_name, summarize
+from ..results.summary import campaign, failed_checks, headline, level_name, summarize
 from .report_plots import level_plots, overview_plots
 
 
@@ -39,7 +40,7 @@ def render_report(result: Result, provenance: Mapping[str, str]) -> str:
         headline=headline(result),
         failed=[check.sentence for check in failed_checks(result)],
         names=[level_name(level) for level in result.levels],
-        findings=[findings(level) for level in result.levels],
+        findings=all_findings(result),
         key_numbers=_key_numbers(result),
         distances=_distances(result),
         models={c.name: c.description for level in result.levels for c in level.comparisons},
@@ -55,7 +56,7 @@ def _key_numbers(result: Result) -> list[Row]:
         n = summarize(level)
         rms = [level.reference_rms_rad, level.torque_rms_nm, level.torque_peak_nm]
         rms += [level.position_rms_rad, level.position_peak_rad]
-        powers = [n.linear_db, n.odd_db, n.even_db, n.noise_db]
+        powers = [n.linear_db, n.total_db, n.odd_db, n.even_db, n.noise_db]
         unreliable = f"{n.unreliable} of {n.lines}"
         rows.append((n.name, *rms, *powers, n.radius_percent, unreliable))
     return rows
@@ -74,6 +75,7 @@ def _distances(result: Result) -> dict[str, list[Any]]:
 def _lines(bla: BlaEstimate) -> list[Row]:
     """Return the BLA line by line."""
     arrays = [bla.frequency_hz, bla.g.real, bla.g.imag, bla.radius_95, bla.var_noise]
-    arrays += [bla.var_nonlinear, bla.nonlinear_p_value, bla.input_relative_variance]
+    arrays += [bla.var_nonlinear, bla.nonlinear_p_value, bla.coherence]
+    arrays += [bla.input_relative_variance]
     words: list[Cell] = ["yes" if flag else "no" for flag in bla.reliable]
     return list(zip(*(array.tolist() for array in arrays), words, strict=True))

@@ -35,6 +35,7 @@ from ..results.summary import (
     signal_at,
     significant,
     summarize,
+    total_distortion,
 )
 
 SIGMA = "\N{GREEK SMALL LETTER SIGMA}"
@@ -49,11 +50,9 @@ MODEL_LINES = (("--ink", "solid"), ("--model", "dash"), ("--ink", "dot"), ("--mo
 
 def level_plots(level: LevelResult) -> dict[str, Plot]:
     """Return the plots of a level by the identifier of their place in the page."""
-    plots = {
-        "spectra": _spectra(level),
-        "distortion": _distortion(level),
-        "time": _time(level.signals),
-    }
+    plots = {"time": _time(level.signals)}
+    if level.excited.frequency_hz.size:
+        plots = {"spectra": _spectra(level), "distortion": _distortion(level)} | plots
     return plots if level.bla is None else {"bla": _bla(level, level.bla)} | plots
 
 
@@ -147,6 +146,11 @@ def _distortion(level: LevelResult) -> Plot:
             faint: Options = {"symbol": symbol, "opacity": 0.4, "showlegend": False}
             traces.append(trace(f, decibel(lines.corrected), name, color, **faint, **note))
             traces.append(trace(f, decibel(lines.smoothed), name, color, dash="solid", **note))
+    total = decibel(total_distortion(level))
+    if np.isfinite(total).any():
+        mark: Options = {"symbol": "diamond", "size": 4}
+        what = "distortion and noise at excited lines"
+        traces.append(trace(level.excited.frequency_hz, total, what, "--nonlinear", **mark, **note))
     _, name, color, symbol = KINDS[0]
     f, y = level.excited.frequency_hz, decibel(level.excited.position)
     traces.append(trace(f, y, name, color, symbol=symbol, **note))
@@ -160,17 +164,23 @@ def _time(signals: TimeSignals) -> Plot:
         ("torque", signals.torque_nm, "N m"),
         ("position", signals.position_rad, "rad"),
     )
+    shown = [row for row in rows if np.isfinite(row[1]).any()]
     traces = []
-    for row, (name, values, unit) in enumerate(rows, start=1):
+    for row, (name, values, unit) in enumerate(shown, start=1):
         t, y = extremes(signals.time_s, values)
         style: Options = {"dash": "solid", "width": 1.0, "row": row, "showlegend": False}
         traces.append(trace(t, y, name, "--ink", **style, unit=unit, at=SECONDS))
-    titles = [f"{name} ({unit})" for name, _, unit in rows]
-    return {"data": traces, "layout": stack(titles, [1.0, 1.0, 1.0], "time (s)")}
+    titles = [f"{name} ({unit})" for name, _, unit in shown]
+    return {"data": traces, "layout": stack(titles, [1.0] * len(shown), "time (s)")}
 
 
 def _amplitudes(result: Result) -> np.ndarray:
-    return np.array([np.sqrt(np.mean(level.amplitude_rad**2)) for level in result.levels])
+    return np.array(
+        [
+            np.sqrt(np.mean(level.amplitude_rad**2)) if level.amplitude_rad.size else np.nan
+            for level in result.levels
+        ]
+    )
 
 
 def _all_bla(result: Result) -> Plot:

@@ -16,26 +16,30 @@ from fjr_kit.check import Check
 from fjr_kit.result_types import Array, Document, EqualArrays, FreeForm, Number, ResultModel, Unit
 from fjr_records.realization import TimeSignals
 
-Method = Literal["robust", "fast"]
+Method = Literal["robust", "fast", "local"]
+Excitation = Literal["periodic", "repeated", "arbitrary"]
 
 
 class BlaEstimate(EqualArrays):
     """BLA at the F excited lines, with variances (paper.md robust and fast method).
 
     Attributes:
-        method: robust (over realizations) or fast (one realization, detection lines).
-        realizations: M.
-        periods: P kept in each realization.
+        method: robust (over realizations), fast (one realization, detection lines) or local (local
+            polynomials over neighbouring lines, any excitation).
+        realizations: M, how many references were played.
+        periods: P, periods kept in each realization, or records that repeat a reference.
         frequency_hz: (F,).
         g: complex (F,), G_BLA = Y/U of the reference-phased means.
         var_total: (F,) variance of g from nonlinearity and noise together.
         var_noise: (F,) variance of g from noise alone; NaN where P = 1.
         var_nonlinear: (F,) signed stochastic nonlinear variance of ONE realization,
-            M (var_total - var_noise); NaN where unknown.
+            M (var_total - var_noise); NaN where unknown. Method local: of one run, as smooth as g.
         nonlinear_p_value: (F,) p-value of var_total/var_noise against F(2(M-1), 2M(P-1)); fast
             method: power of Yc over noise at the K nearest odd detection lines against
             F(2K, 2K(P-1)); NaN where unknown.
         radius_95: (F,) radius of the 95 % confidence disc of g.
+        coherence: (F,) share of the power of Y in one realization that is G U; the rest is
+            distortion and noise, the answer of the loop to them taken away. NaN where unknown.
         input_relative_variance: (F,) Var(U)/|U|^2 of the mean torque spectrum.
         reliable: bool (F,), False where Var(U)/|U|^2 is not small.
     """
@@ -50,6 +54,7 @@ class BlaEstimate(EqualArrays):
     var_nonlinear: Annotated[np.ndarray, Array("(rad/(N m))^2")]
     nonlinear_p_value: Annotated[np.ndarray, Array("1")]
     radius_95: Annotated[np.ndarray, Array("rad/(N m)")]
+    coherence: Annotated[np.ndarray, Array("1")]
     input_relative_variance: Annotated[np.ndarray, Array("1")]
     reliable: Annotated[np.ndarray, Array("bool", bool)]
 
@@ -105,6 +110,8 @@ class LevelResult(ResultModel):
         amplitude_rad: amplitude of each excited line, (F,).
         bla: the BLA by the method asked for; None if the data allow none (not periodic, say).
         excited, odd, even: levels by kind of line (odd and even detection lines; may be empty).
+        left_out_hz: (L,) frequencies of the estimate's grid at which the torque does not follow the
+            reference beyond noise, so that nothing is known there; records only.
         comparisons: distances from reference models.
         signals: time signals for plots.
         reference_rms_rad, torque_rms_nm, position_rms_rad: rms over all kept periods.
@@ -117,6 +124,7 @@ class LevelResult(ResultModel):
     excited: LineLevels
     odd: LineLevels
     even: LineLevels
+    left_out_hz: Annotated[np.ndarray, Array("Hz")]
     comparisons: tuple[Comparison, ...]
     signals: TimeSignals
     reference_rms_rad: Annotated[Number, Unit("rad")]
@@ -140,8 +148,9 @@ class Result(Document):
     Attributes:
         source: the folder as the user gave it.
         sample_rate_hz: rate of the samples.
-        samples_per_period: N.
-        periods: P kept.
+        excitation: periodic; or arbitrary, repeated where a reference was played again.
+        samples_per_period: N; the samples of the longest record if it is not periodic.
+        periods: P kept; 1 if not periodic.
         transient_periods: discarded periods.
         described: whether the bags held an experiment description; if not, everything above was
             found in the reference itself.
@@ -152,8 +161,9 @@ class Result(Document):
         controller: description of the controller, if known.
     """
 
-    schema_name: Literal["fjr_rig/result/1"] = Field("fjr_rig/result/1", alias="schema")
+    schema_name: Literal["fjr_rig/result/2"] = Field("fjr_rig/result/2", alias="schema")
     source: str
+    excitation: Excitation
     sample_rate_hz: Annotated[Number, Unit("Hz")]
     samples_per_period: int
     periods: int

@@ -8,13 +8,19 @@ import numpy as np
 
 from fjr_kit.check import Check, failed
 
-from .result import BlaEstimate, LevelResult, LineLevels, Result
+from .result import BlaEstimate, LevelResult, LineLevels, Method, Result
 
 SIGNIFICANCE = 0.05
 """Below this p-value the nonlinear variance of a line counts as significant."""
 
 AT_NOISE_DB = 2.0
 """A mean power this near to that of noise counts as noise."""
+
+METHODS: dict[Method, str] = {
+    "robust": "robust method",
+    "fast": "fast method",
+    "local": "local polynomial method",
+}
 
 ROUND_OFF = 1e-10
 """A reference line this much weaker than the strongest one is left out of plots."""
@@ -65,6 +71,18 @@ def significant(bla: BlaEstimate) -> np.ndarray:
     return (bla.nonlinear_p_value < SIGNIFICANCE) & (bla.var_nonlinear > 0)
 
 
+def total_distortion(level: LevelResult) -> np.ndarray:
+    """Return the rms of distortion and noise in y at the excited lines of one realization, rad.
+
+    The answer of the loop to them is taken away; by the coherence, NaN where that is unknown.
+    """
+    if level.bla is None:
+        return np.full(level.excited.position.shape, np.nan)
+    with np.errstate(divide="ignore"):
+        rest = 1.0 / level.bla.coherence - 1.0
+    return np.asarray(np.abs(level.bla.g) * level.excited.torque * np.sqrt(rest))
+
+
 def mean_level_db(amplitude: np.ndarray) -> float:
     """Return the level of the mean power of lines in dB; NaN if no line is known."""
     known = amplitude[np.isfinite(amplitude)]
@@ -80,8 +98,9 @@ class LevelSummary:
         lines, unreliable: excited lines, and those whose Var(U)/|U|^2 is not small.
         significant, negative: lines whose nonlinear variance is significant, or negative.
         radius_percent: median over lines of the 95 % disc radius over |G|, in percent.
-        linear_db, odd_db, even_db, noise_db: mean power of Y at excited lines, of Yc at odd and
-            even detection lines, and of noise, in dB re 1 rad; NaN where there is none.
+        linear_db, total_db, odd_db, even_db, noise_db: mean power of Y at excited lines, of
+            distortion and noise there, of Yc at odd and even detection lines, and of noise, in dB
+            re 1 rad; NaN where there is none.
     """
 
     level: int
@@ -92,6 +111,7 @@ class LevelSummary:
     negative: int
     radius_percent: float
     linear_db: float
+    total_db: float
     odd_db: float
     even_db: float
     noise_db: float
@@ -111,6 +131,7 @@ def summarize(level: LevelResult) -> LevelSummary:
         negative=int((bla.var_nonlinear < 0).sum()) if bla is not None else 0,
         radius_percent=100.0 * float(np.median(radius)) if radius.size else float("nan"),
         linear_db=mean_level_db(level.excited.position),
+        total_db=mean_level_db(total_distortion(level)),
         odd_db=mean_level_db(level.odd.corrected),
         even_db=mean_level_db(level.even.corrected),
         noise_db=mean_level_db(noise_of(level)),
@@ -124,7 +145,11 @@ def noise_of(level: LevelResult) -> np.ndarray:
 
 
 def level_name(level: LevelResult) -> str:
-    """Return the name of a level by its line amplitude, such as 'Level 0, 7 mrad'."""
+    """Return the name of a level, such as 'Level 0, 7 mrad', by its line amplitude or its rms."""
+    if not level.amplitude_rad.size or not np.isfinite(level.reference_rms_rad):
+        return f"Level {level.level}"
+    if level.bla is not None and level.bla.method == "local":
+        return f"Level {level.level}, {1e3 * level.reference_rms_rad:.3g} mrad rms"
     low, high = 1e3 * np.min(level.amplitude_rad), 1e3 * np.max(level.amplitude_rad)
     span = f"{high:.3g}" if np.isclose(low, high) else f"{low:.3g}-{high:.3g}"
     return f"Level {level.level}, {span} mrad"
@@ -148,77 +173,28 @@ def headline(result: Result) -> str:
 def campaign(result: Result) -> str:
     """Return what was analysed in one sentence."""
     levels, first = len(result.levels), result.levels[0]
-    period = result.samples_per_period / result.sample_rate_hz
+    seconds = result.samples_per_period / result.sample_rate_hz
     f = first.excited.frequency_hz
-    realizations = (
-        "" if first.bla is None else f"{_count(first.bla.realizations, 'realization')} x "
-    )
-    method = "" if first.bla is None else f", {first.bla.method} method"
-    return (
-        f"{_count(levels, 'level')}, {realizations}{_count(result.periods, 'period')} of "
-        f"{period:.4g} s at {result.sample_rate_hz:.6g} Hz after "
-        f"{_count(result.transient_periods, 'transient period')}, {len(f)} excited lines from "
-        f"{f.min():.4g} to {f.max():.4g} Hz{method}."
-    )
-
-
-def findings(level: LevelResult) -> list[str]:
-    """Return what the data of a level say, in sentences."""
-    if level.bla is None:
-        return ["No BLA: the data do not allow one; see the checks."]
-    return [s for s in (_model_sentence(level), *_distortion_sentences(level), *_lines(level)) if s]
-
-
-def _model_sentence(level: LevelResult) -> str:
-    known = [c for c in level.comparisons if np.isfinite(c.v_mean)]
-    if not known:
-        return ""
-    best = min(known, key=lambda c: c.v_mean)
-    nearest = f"Nearest model: {best.name}" if len(known) > 1 else f"Against {best.name}"
-    return f"{nearest}, V = {best.v_mean:.3g} dB\N{SUPERSCRIPT TWO}."
-
-
-def _distortion_sentences(level: LevelResult) -> list[str]:
-    """Return one sentence for each kind of detection line, relative to its own noise."""
-    linear = mean_level_db(level.excited.position)
-    kinds: tuple[tuple[str, LineLevels], ...] = (("Odd", level.odd), ("Even", level.even))
-    sentences = []
-    for name, lines in kinds:
-        power = mean_level_db(lines.corrected)
-        if not np.isfinite(power):
-            continue
-        noise = _beside_noise(power - mean_level_db(lines.noise))
-        below = linear - power
-        sentences.append(f"{name} distortion {below:.1f} dB below the excited lines{noise}.")
-    return sentences
-
-
-def _beside_noise(above_db: float) -> str:
-    """Return how a level lies to its noise, as the end of a sentence."""
-    if not np.isfinite(above_db):
-        return ""
-    if abs(above_db) < AT_NOISE_DB:
-        return ", at the level of noise"
-    return f", {abs(above_db):.1f} dB {'above' if above_db > 0 else 'below'} noise"
-
-
-def _lines(level: LevelResult) -> list[str]:
-    """Return sentences about the lines of the BLA."""
-    numbers = summarize(level)
-    sentences = []
-    if level.bla is not None and np.isfinite(level.bla.nonlinear_p_value).any():
-        sentences.append(
-            f"Nonlinear variance significant ({100 * SIGNIFICANCE:g} % level) at "
-            f"{numbers.significant} of {numbers.lines} lines."
+    span = f"{f.min():.4g} to {f.max():.4g} Hz" if f.size else "none"
+    method = "" if first.bla is None else f", {METHODS[first.bla.method]}"
+    if result.excitation != "periodic":
+        again = " that repeat references" if result.excitation == "repeated" else ""
+        return (
+            f"Excitation without period: {counted(levels, 'level')}, "
+            f"{counted(len(result.bags), 'record')}{again}, of up to {seconds:.4g} s at "
+            f"{result.sample_rate_hz:.6g} Hz, {len(f)} frequencies, {span}{method}."
         )
-    if level.bla is not None and numbers.unreliable:
-        why = "varies too much between realizations there"
-        if level.bla.realizations == 1:
-            why = "is too weak there beside its distortion and noise"
-        lines = _count(numbers.unreliable, "line")
-        sentences.append(f"{lines} unreliable: the torque {why}.")
-    return sentences
+    realizations = (
+        "" if first.bla is None else f"{counted(first.bla.realizations, 'realization')} x "
+    )
+    return (
+        f"Periodic excitation: {counted(levels, 'level')}, {realizations}"
+        f"{counted(result.periods, 'period')} of {seconds:.4g} s at {result.sample_rate_hz:.6g} Hz "
+        f"after {counted(result.transient_periods, 'transient period')}, {len(f)} excited lines "
+        f"from {span}{method}."
+    )
 
 
-def _count(number: int, noun: str) -> str:
+def counted(number: int, noun: str) -> str:
+    """Return a number with its noun, in the plural where it must be."""
     return f"{number} {noun}{'' if number == 1 else 's'}"

@@ -26,6 +26,7 @@ BLA_COLUMNS = {
     "var_nonlinear": "var_nonlinear_rad2_per_nm2",
     "nonlinear_p_value": "nonlinear_p_value",
     "radius_95": "radius_95_rad_per_nm",
+    "coherence": "coherence",
     "input_relative_variance": "input_relative_variance",
 }
 """Column of frf.csv for each real array of the BLA."""
@@ -33,7 +34,7 @@ BLA_COLUMNS = {
 UNITS = units(LevelResult)
 """Unit of every numeric field of a level."""
 
-HEADER = b"MATLAB 5.0 MAT-file, fjr_rig/result/1"
+HEADER = b"MATLAB 5.0 MAT-file, fjr_rig/result/2"
 
 
 def frf_csv(result: Result) -> str:

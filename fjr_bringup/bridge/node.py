@@ -87,19 +87,18 @@ class ServingBridge(runtime.RigNode):
         self._position: tuple[int, float] | None = None
         self._ready = False
         self._before, self._held = (0, 0.0), 0.0
-        states, signal = str(values["joint_states_topic"]), runtime.SIGNAL_QOS
-        self._states = self.create_publisher(JointState, states, signal)
-        self._torque = self.create_publisher(JointState, topics.MOTOR_TORQUE.topic, signal)
+        states = str(values["joint_states_topic"])
+        self._states = self.create_publisher(JointState, states, runtime.SIGNAL_QOS)
+        self._torque = self.offer(topics.MOTOR_TORQUE)
         self.claim(self._torque)
-        self._commands = self._hear(self._topic, self._on_command)
-        self._positions = self._hear(topics.MOTOR_POSITION.topic, self._on_position)
+        self._commands = self.create_subscription(
+            JointState, self._topic, self._on_command, runtime.SIGNAL_QOS, raw=True
+        )
+        self._positions = self.hear(topics.MOTOR_POSITION, self._on_position)
         if reference:
-            self._hear(topics.REFERENCE.topic, self._on_reference)
+            self.hear(topics.REFERENCE, self._on_reference)
         if echo:
             self.call_every(_RESEND_S, self._send_again)
-
-    def _hear(self, topic, callback):
-        return self.create_subscription(JointState, topic, callback, runtime.SIGNAL_QOS, raw=True)
 
     def _on_reference(self, message: bytes) -> None:
         stamp, value = _decoded(self._decode, message, topics.REFERENCE.topic)
@@ -199,10 +198,7 @@ class ObservingBridge(runtime.RigNode):
         self._encoders = {
             signal.symbol: JointStateWriter(signal.field, joint).encode for signal in signals
         }
-        self._writers = {
-            signal.symbol: self.create_publisher(JointState, signal.topic, runtime.SIGNAL_QOS)
-            for signal in signals
-        }
+        self._writers = {signal.symbol: self.offer(signal) for signal in signals}
         for writer in self._writers.values():
             self.claim(writer)
         self.wait_until(self._lacking, self._begin)

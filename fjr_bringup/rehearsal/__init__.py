@@ -1,1 +1,7 @@
-"""Rehearsal on the wall clock: timing, faults, limits, GO or NO-GO: `fjr rehearse`."""
+"""Rehearsal on the wall clock, with faults, that ends in GO or NO-GO: `fjr rehearse`.
+
+A checked `request` goes in, a `result.Rehearsal` and its `report` come out. Begin with `rehearse`,
+which leads through it: `rehearsal_run` conducts the nodes, `observer` writes down every message,
+`timing`, `safety`, `prediction` and `machine` say what came of it, `limits` judge, `advice` tells
+what to do.
+"""

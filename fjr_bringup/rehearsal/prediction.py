@@ -15,8 +15,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import computed_field
 
-from controller_node import transfer_function
-from controller_node.transfer_function import TransferFunction
+from controller_node.law import as_transfer_function, law_of
 from fjr_interface.experiment import Experiment
 from fjr_kit.errors import InputError
 from fjr_kit.result_types import Array, EqualArrays, Number, Unit
@@ -84,8 +83,7 @@ def predict(values: Mapping[str, Any], experiment: Experiment, delay_s: np.ndarr
         InputError: the controller is of no known kind.
     """
     rate = experiment.sample_rate_hz
-    law = transfer_function.law_of(experiment.controller or {}, rate)
-    law = law if isinstance(law, TransferFunction) else TransferFunction.of_pd(law)
+    law = as_transfer_function(law_of(experiment.controller, rate))
     viscous = {**values, "fs": 0.0, "fsm": 0.0, "k1": 0.0}
     equivalent = _equivalent(values, experiment)
     equivalent_margin_s = math.nan if equivalent is None else delay_margin(equivalent, law, rate)

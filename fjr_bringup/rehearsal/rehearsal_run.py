@@ -107,7 +107,7 @@ class RehearsalConductor(Conductor):
         """
         if self._restarted:  # one that has not found our clients yet drops its answers
             self._wait_for_answers()
-        self._ask("release")
+        self._ask_controller("release")
         on_wire = plan is not None and plan.fault.acts_on != NODE
         text = as_text(plan) if plan is not None and on_wire else NO_FAULT
         self._set_parameters(self._set_simulator, "simulator", fault=text, fault_seed=seed)
@@ -157,7 +157,7 @@ class RehearsalConductor(Conductor):
                 self._bring_to_rest()
         interrupted, ended_ns = self._interruption.asked, time.time_ns()
         machine = watch.ended()
-        status = self._ask("status")
+        status = self._ask_controller("status")
         trip = None if status is None or status.success else str(status.message)
         arrivals = self._recorder.close()
         return Played(
@@ -174,7 +174,7 @@ class RehearsalConductor(Conductor):
 
     def _bring_to_rest(self) -> None:
         """Take the torque to zero by the controller's ramp, and see it arrive there."""
-        if self._ask("estop") is None:
+        if self._ask_controller("estop") is None:
             return
         until = time.monotonic() + _REST_S
         while time.monotonic() < until:
@@ -184,7 +184,7 @@ class RehearsalConductor(Conductor):
                 return
             time.sleep(_POLL_S)
 
-    def _ask(self, name: str) -> Trigger.Response | None:
+    def _ask_controller(self, name: str) -> Trigger.Response | None:
         """Call a service of the controller; return None if it does not answer."""
         client = self._controller[name]
         if not client.service_is_ready():

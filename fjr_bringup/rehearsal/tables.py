@@ -5,11 +5,8 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable
-from pathlib import Path
-
 from fjr_interface.parameters import Parameter
+from fjr_kit.document_tables import renew
 from fjr_sim_node.drive.faults import CATALOGUE, Fault
 
 from .limits import LIMITS
@@ -56,25 +53,7 @@ def _value(parameter: Parameter) -> str:
     return f"{parameter.default:g}".replace("inf", "none")
 
 
-TABLES: dict[str, Callable[[], str]] = {"limits": limits_table, "faults": faults_table}
-
-
-def in_step(document: str) -> str:
-    """Return a document with the present tables between their marks."""
-    for name, table in TABLES.items():
-        begin, end = f"<!-- {name}: begin -->", f"<!-- {name}: end -->"
-        before, found, rest = document.partition(begin)
-        _, closed, after = rest.partition(end)
-        if not found or not closed:
-            raise ValueError(f"the document lacks the marks {begin} and {end}")
-        document = f"{before}{begin}\n\n{table()}\n\n{end}{after}"
-    return document
-
+TABLES = {"limits": limits_table(), "faults": faults_table()}
 
 if __name__ == "__main__":
-    if len(sys.argv) > 1:
-        path = Path(sys.argv[1])
-        path.write_text(in_step(path.read_text(encoding="utf-8")), encoding="utf-8")
-    else:
-        for make in TABLES.values():
-            print(make(), end="\n\n")
+    renew(TABLES)

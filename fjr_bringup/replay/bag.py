@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import struct
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,9 +11,6 @@ from fjr_interface.parameters import Parameter
 from fjr_kit.errors import InputError
 
 BAG_PARAMETER = Parameter("bag", "", "", "Folder of the bag to replay")
-
-_CLOCK = struct.Struct("<4siI")
-_CDR = b"\x00\x01\x00\x00"
 
 
 @dataclass(frozen=True)
@@ -51,8 +47,3 @@ def read_description(bag: str) -> Experiment:
 def read_recorded(bag: str) -> Recorded:
     """Read a bag; raise InputError if it is not whole or describes no experiment."""
     return Recorded(read_description(bag), read_record(bag))
-
-
-def clock_message(stamp_ns: int) -> bytes:
-    """Return the CDR bytes of a rosgraph_msgs/Clock."""
-    return _CLOCK.pack(_CDR, *divmod(stamp_ns, 1_000_000_000))

@@ -7,8 +7,6 @@ from __future__ import annotations
 
 import sys
 
-from sensor_msgs.msg import JointState
-
 from fjr_interface import topics
 from fjr_interface.bags.joint_state import JointStateReader, JointStateWriter, LayoutError
 from fjr_interface.parameters import ParameterGroup
@@ -38,12 +36,8 @@ class ReplayControllerNode(runtime.RigNode):
         self._stamps = record.stamps_ns.tolist()
         self._decode = JointStateReader("position").decode
         self._sample = 0
-        self._torque = self.create_publisher(
-            JointState, topics.MOTOR_TORQUE.topic, runtime.SIGNAL_QOS
-        )
-        self.create_subscription(
-            JointState, topics.MOTOR_POSITION.topic, self._on_position, runtime.SIGNAL_QOS, raw=True
-        )
+        self._torque = self.offer(topics.MOTOR_TORQUE)
+        self.hear(topics.MOTOR_POSITION, self._on_position)
 
     def _on_position(self, message: bytes) -> None:
         try:

@@ -17,13 +17,12 @@ from rclpy.signals import SignalHandlerOptions
 from rosgraph_msgs.msg import Clock
 
 from fjr_interface.ros import runtime
-from fjr_interface.topics import NAMESPACE
+from fjr_interface.topics import NAMESPACE, clock_message
 from fjr_kit.errors import InputError
 from fjr_kit.stopping import Interruption
 
 from ..campaign.progress import CampaignProgress
 from ..graph.domain import own_domain, reach
-from .bag import clock_message
 from .messages import CLOCK, Messages, PlayedTopic
 from .publishing import Published, PublishedTopic, Publishing
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 import sys
 
 from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
 from fjr_interface import topics
@@ -20,7 +19,7 @@ from fjr_interface.ros.program import Program
 from fjr_interface.waiting import Lack
 from fjr_kit.errors import InputError
 
-from .bag import BAG_PARAMETER, clock_message, read_recorded
+from .bag import BAG_PARAMETER, read_recorded
 
 PARAMETERS = ParameterGroup(
     BAG_PARAMETER, runtime.JOINT_PARAMETER, runtime.readers_parameter("controller")
@@ -44,12 +43,8 @@ class ReplaySimulatorNode(runtime.RigNode):
         self._decode = JointStateReader("effort").decode
         self._sample = len(self._stamps)
         self._ticks = self.create_publisher(Clock, "/clock", runtime.CLOCK_QOS)
-        self._position = self.create_publisher(
-            JointState, topics.MOTOR_POSITION.topic, runtime.SIGNAL_QOS
-        )
-        self._torque = self.create_subscription(
-            JointState, topics.MOTOR_TORQUE.topic, self._on_torque, runtime.SIGNAL_QOS, raw=True
-        )
+        self._position = self.offer(topics.MOTOR_POSITION)
+        self._torque = self.hear(topics.MOTOR_TORQUE, self._on_torque)
         self.create_subscription(
             String, topics.EXPERIMENT_TOPIC, self._on_experiment, runtime.EXPERIMENT_QOS
         )
@@ -68,7 +63,7 @@ class ReplaySimulatorNode(runtime.RigNode):
 
     def _publish_sample(self) -> None:
         self._position.publish(self._messages[self._sample].tobytes())
-        self._ticks.publish(clock_message(self._stamps[self._sample]))
+        self._ticks.publish(topics.clock_message(self._stamps[self._sample]))
 
     def _on_torque(self, message: bytes) -> None:
         try:

@@ -13,9 +13,11 @@ from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.exceptions import InvalidParameterValueException
+from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
 from rclpy.timer import Timer
+from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
 from fjr_kit.errors import InputError
@@ -23,7 +25,7 @@ from fjr_kit.errors import InputError
 from ..health import Health
 from ..parameters import Parameter, ParameterGroup
 from ..real_time import NEVER
-from ..topics import JOINT, NAMESPACE, SIGNAL_DEPTH
+from ..topics import JOINT, NAMESPACE, SIGNAL_DEPTH, Signal
 from ..waiting import Lack, Waiting
 from . import fast_dds
 from .graph_node import GraphNode, Values
@@ -114,6 +116,14 @@ class RigNode(GraphNode):
         """Subscribe; an InputError in the callback ends the node with that sentence."""
         ending = self._ending_node(callback)
         return super().create_subscription(msg_type, topic, ending, *args, **kw)
+
+    def offer(self, signal: Signal) -> Publisher:
+        """Publish a signal of the rig."""
+        return self.create_publisher(JointState, signal.topic, SIGNAL_QOS)
+
+    def hear(self, signal: Signal, callback: Callable[[bytes], None]) -> Subscription:
+        """Subscribe to the serialized messages of a signal of the rig."""
+        return self.create_subscription(JointState, signal.topic, callback, SIGNAL_QOS, raw=True)
 
     def call_every(self, period_s: float, callback: Callable[[], None]) -> Timer:
         """Create a timer of the machine's time, whatever clock the node is told to use.

@@ -30,8 +30,8 @@ def unrelated(signals: Mapping[str, np.ndarray], repetition: Repetition | None) 
     if "r" not in signals or not np.ptp(signals["r"]) > 0:
         return None
     if repetition is None:
-        alike = max(_coherence(signals["r"], signals[s]) for s in "uy")
-        alike, least = max(alike, _correlation(signals["r"], signals["y"])), UNRELATED
+        r, u, y = (_near_one(signals[s]) for s in "ruy")
+        alike, least = max(_coherence(r, u), _coherence(r, y), _correlation(r, y)), UNRELATED
     elif repetition.excited.size >= LEAST_LINES:
         alike, least = max(_smoothness(signals["r"], signals[s], repetition) for s in "uy"), ROUGH
     else:
@@ -42,6 +42,11 @@ def unrelated(signals: Mapping[str, np.ndarray], repetition: Repetition | None) 
         f"torque and position do not go with the reference (likeness {alike:.2f} of 1), so it is "
         "that of another run; map the right one, or leave the reference out"
     )
+
+
+def _near_one(values: np.ndarray) -> np.ndarray:
+    """Return a signal times a power of two, so that no product of powers overflows or vanishes."""
+    return np.ldexp(values, -np.frexp(np.abs(values).max())[1])
 
 
 def _coherence(one: np.ndarray, other: np.ndarray) -> float:

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.signal import lfilter
 
-from controller_node import controller_file, transfer_function
+from controller_node import controller_file
+from controller_node.law import as_transfer_function, law_of
 from fjr_interface.bags.folder_names import bag_folder
 from fjr_interface.bags.writer import BagWriter
 from fjr_interface.topics import LINK_POSITION, MOTOR_POSITION, MOTOR_TORQUE, REFERENCE
@@ -87,19 +87,9 @@ def _check_controller(record: Record, controller: dict[str, Any], source: str) -
     if "r" not in record.signals or "unknown" in controller:
         return
     r, u, y = (record.signals[symbol] for symbol in "ruy")
-    if controller["kind"] == controller_file.TWO_DEGREES:
-        laws = [controller["reference"], controller["position"]]
-    else:
-        one = transfer_function.as_transfer_function(
-            transfer_function.law_of(controller, record.sample_rate_hz)
-        )
-        laws = [{"numerator": one.numerator, "denominator": one.denominator}] * 2
+    law = as_transfer_function(law_of(controller, record.sample_rate_hz))
     with np.errstate(all="ignore"):
-        expected = lfilter(laws[0]["numerator"], laws[0]["denominator"], r) - lfilter(
-            laws[1]["numerator"], laws[1]["denominator"], y
-        )
-    limit = controller.get("torque_limit_nm")
-    expected = expected if limit is None else np.clip(expected, -limit, limit)
+        expected = law.clamped(law.unlimited(r, y))
     settled = slice(int(_SETTLE * u.size), None)
     scale = float(np.std(u[settled]))
     with np.errstate(all="ignore"):

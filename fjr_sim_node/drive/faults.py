@@ -21,6 +21,8 @@ SAFE_STATES = {
     NO_TORQUE: "every torque is zero, or none comes and the drive lets go",
 }
 """The safe states in which a fault may end, in words."""
+WITHIN_S = {CONTINUES: 0.1, NO_TORQUE: 0.2}
+"""No torque: from this long after the fault began; continues: the longest pause of the torques."""
 
 POSITION, TORQUE, NODE = "position", "torque", "node"
 """Where a fault acts: on positions, on torques, or on the process of a node."""
@@ -37,138 +39,81 @@ class Fault:
         identifier: its fixed name.
         summary: what happens, one sentence.
         acts_on: POSITION, TORQUE or NODE.
-        parameters: its parameters.
         safe_state: a key of SAFE_STATES.
-        within_s: the safe state holds from this long after the fault began; for CONTINUES the
-            longest pause between two torques.
         finding: the check that must turn the verdict to NO-GO, empty if the loop may pass.
+        parameters: its parameters.
     """
 
     identifier: str
     summary: str
     acts_on: str
-    parameters: ParameterGroup
     safe_state: str
-    within_s: float
     finding: str
+    parameters: ParameterGroup
+
+    @property
+    def within_s(self) -> float:
+        """When its safe state must hold, see WITHIN_S."""
+        return WITHIN_S[self.safe_state]
 
 
-def _fault(identifier: str, summary: str, acts_on: str, *parameters: Parameter, **rest) -> Fault:
-    return Fault(identifier, summary, acts_on, ParameterGroup(*parameters, _AFTER), **rest)
+def _fault(
+    identifier: str, summary: str, acts_on: str, ends: str, finding: str, *parameters: Parameter
+) -> Fault:
+    group = ParameterGroup(*parameters, _AFTER)
+    return Fault(identifier, summary, acts_on, ends, finding, group)
 
 
 CATALOGUE: tuple[Fault, ...] = (
     _fault(
-        "delay",
-        "Positions come late by a constant time.",
-        POSITION,
+        "delay", "Positions come late by a constant time.", POSITION, CONTINUES, "delay_margin",
         Parameter("time_s", 5e-3, "s", "By how much", 0.0, 1.0),
-        safe_state=CONTINUES,
-        within_s=0.1,
-        finding="delay_margin",
     ),
     _fault(
-        "jitter",
-        "Positions come late by a random time, in their order.",
-        POSITION,
-        Parameter("spread_s", 5e-3, "s", "Uniform from zero to this", 0.0, 1.0),
-        safe_state=CONTINUES,
-        within_s=0.1,
-        finding="jitter",
+        "jitter", "Positions come late by a random time, in their order.", POSITION, CONTINUES,
+        "jitter", Parameter("spread_s", 5e-3, "s", "Uniform from zero to this", 0.0, 1.0),
+    ),
+    _fault("loss", "Positions are lost.", POSITION, CONTINUES, "lost", _SHARE),
+    _fault(
+        "reordering", "Positions come after the one that follows them.", POSITION, CONTINUES,
+        "unordered", _SHARE,
     ),
     _fault(
-        "loss",
-        "Positions are lost.",
-        POSITION,
-        _SHARE,
-        safe_state=CONTINUES,
-        within_s=0.1,
-        finding="lost",
+        "duplicated_stamps", "Positions come twice with the same stamp.", POSITION, CONTINUES,
+        "repeated", _SHARE,
     ),
     _fault(
-        "reordering",
-        "Positions come after the one that follows them.",
-        POSITION,
-        _SHARE,
-        safe_state=CONTINUES,
-        within_s=0.1,
-        finding="unordered",
-    ),
-    _fault(
-        "duplicated_stamps",
-        "Positions come twice with the same stamp.",
-        POSITION,
-        _SHARE,
-        safe_state=CONTINUES,
-        within_s=0.1,
-        finding="repeated",
-    ),
-    _fault(
-        "encoder_dropout",
-        "No position comes for a while.",
-        POSITION,
+        "encoder_dropout", "No position comes for a while.", POSITION, NO_TORQUE, "lost",
         Parameter("for_s", 1.0, "s", "How long", 0.0, 1e6),
-        safe_state=NO_TORQUE,
-        within_s=0.2,
-        finding="lost",
     ),
     _fault(
-        "encoder_jump",
-        "The position jumps, and stays there.",
-        POSITION,
+        "encoder_jump", "The position jumps, and stays there.", POSITION, NO_TORQUE, "response",
         Parameter("step_rad", 1.0, "rad", "By how much", -100.0, 100.0),
-        safe_state=NO_TORQUE,
-        within_s=0.2,
-        finding="response",
     ),
     _fault(
-        "nan",
-        "The position is not a number.",
-        POSITION,
+        "nan", "The position is not a number.", POSITION, NO_TORQUE, "not_finite",
         Parameter("samples", 1, "", "How many samples in a row", 1, 1_000_000),
-        safe_state=NO_TORQUE,
-        within_s=0.2,
-        finding="not_finite",
     ),
     _fault(
-        "drive_saturation",
-        "The drive gives less torque than commanded.",
-        TORQUE,
-        Parameter("limit_nm", 8.0, "N m", "The most that it gives", 0.0, 1e6),
-        safe_state=CONTINUES,
-        within_s=0.1,
-        finding="response",
+        "drive_saturation", "The drive gives less torque than commanded.", TORQUE, CONTINUES,
+        "response", Parameter("limit_nm", 8.0, "N m", "The most that it gives", 0.0, 1e6),
     ),
     _fault(
-        "drive_trip",
-        "The drive gives no torque any more; its encoder still answers.",
-        TORQUE,
-        safe_state=CONTINUES,
-        within_s=0.1,
-        finding="response",
+        "drive_trip", "The drive gives no torque any more; its encoder still answers.", TORQUE,
+        CONTINUES, "response",
     ),
     _fault(
-        "clock_jump",
-        "The clock of the drive jumps: all stamps are off from then on.",
-        POSITION,
-        Parameter("step_s", 0.5, "s", "By how much", -1e4, 1e4),
-        safe_state=NO_TORQUE,
-        within_s=0.2,
-        finding="clock_jumps",
+        "clock_jump", "The clock of the drive jumps: all stamps are off from then on.", POSITION,
+        NO_TORQUE, "clock_jumps", Parameter("step_s", 0.5, "s", "By how much", -1e4, 1e4),
     ),
     _fault(
-        "node_killed",
-        "The process of a node is killed, and started again later.",
-        NODE,
-        Parameter(
-            "node", "controller", "", "Which one", choices=("controller", "excitation", "simulator")
-        ),
+        "node_killed", "The process of a node is killed, and started again later.", NODE,
+        NO_TORQUE, "unanswered",
+        Parameter("node", "controller", "", "Which one",
+                  choices=("controller", "excitation", "simulator")),
         Parameter("restart_after_s", 1.0, "s", "Started again after; .inf: never", 0.0),
-        safe_state=NO_TORQUE,
-        within_s=0.2,
-        finding="unanswered",
     ),
-)
+)  # fmt: skip
 """All faults."""
 
 FAULTS: dict[str, Fault] = {fault.identifier: fault for fault in CATALOGUE}

@@ -35,7 +35,7 @@ class LockstepDrive:
         self._noise = array("d", encoder_noise(values, experiment).tobytes())
         self._period_s = 1.0 / experiment.sample_rate_hz
         self._plant = plant.coefficients(values)
-        self._link_side = rig.MOTOR if plant.rigid_sums(values) is not None else rig.LINK
+        self._link_side = rig.MOTOR if plant.moves_as_one(values) else rig.LINK
         self._effects = effects.coefficients(values)
         self._state = rig.at_rest(experiment.elapsed_s)
         rig.hold(rig.at_rest(), 0.0, self._period_s, self._plant, self._effects)  # compiles it

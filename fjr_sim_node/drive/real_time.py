@@ -85,7 +85,7 @@ class RealTimeDrive:
         self._stamps = array("q", experiment.stamps_ns.tobytes())
         self._noise = array("d", encoder_noise(values, experiment).tobytes())
         self._plant = plant.coefficients(values)
-        self._link_side = rig.MOTOR if plant.rigid_sums(values) is not None else rig.LINK
+        self._link_side = rig.MOTOR if plant.moves_as_one(values) else rig.LINK
         # The effect delays by samples, as the lockstep needs it; here it lies between arrival and
         # action, whenever that is.
         delay = fx.NAMES[fx.DELAY_TIME_S]

@@ -3,8 +3,9 @@
 An entry (`entry.Effect`) holds identifier, law, parameters with unit, bounds and source, what the
 effect acts on, starts of fits, near and exact equivalents, and telltale. Node parameters, parameter
 files, fits, documents and reports all read it. To add an effect, add its entry to `friction`,
-`transmission` or `drive` and write its law (`plant.torques` or `simulation.rig`), where
-`fx.EFFECT_PARAMETER`, in capitals, is the place of a parameter among the coefficients.
+`transmission` or `drive` and write its law (in `plant` or `simulation.rig`), where
+`fx.EFFECT_PARAMETER`, in capitals, is the place of a parameter among the coefficients. What is the
+bare plant with other values (friction that a datasheet lacks) needs no kernel: `plant.with_added`.
 
 An effect is off while its sizes have their defaults; then the plant is the bare one, bit for bit.
 Parameter names in files and in ROS are `effect.parameter`.
@@ -12,7 +13,7 @@ Parameter names in files and in ROS are `effect.parameter`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 from .drive import DRIVE, ENCODER
@@ -29,6 +30,7 @@ __all__ = [
     "Effect",
     "EffectParameter",
     "coefficients",
+    "contains",
     "near_equivalents",
     "parameter",
 ]
@@ -48,7 +50,12 @@ DEFAULTS: tuple[float, ...] = tuple(float(parameter.default) for parameter in PA
 
 _BY_NAME = {parameter.name: parameter for parameter in PARAMETERS}
 _PLACES = {name.upper().replace(".", "_"): place for place, name in enumerate(NAMES)}
-_SIZES = tuple(NAMES.index(name) for effect in CATALOGUE for name in effect.size_names)
+_SIZES = tuple(
+    NAMES.index(name)
+    for effect in CATALOGUE
+    if not effect.of_bare_plant
+    for name in effect.size_names
+)
 
 
 def __getattr__(name: str) -> int:
@@ -72,8 +79,16 @@ def near_equivalents(identifier: str) -> frozenset[str]:
     }
 
 
+def contains(richer: Collection[str], simpler: Collection[str]) -> bool:
+    """Tell whether effects are others but for one, which holds the other's as a limit case."""
+    more, less = set(richer) - set(simpler), set(simpler) - set(richer)
+    return len(more) == len(less) == 1 and less <= set(EFFECTS[min(more)].contains)
+
+
 def coefficients(values: Mapping[str, Any]) -> tuple[float, ...] | None:
-    """Return the effects' parameters in the order of `NAMES`; None if all are off.
+    """Return the effects' parameters in the order of `NAMES`; None if no kernel needs them.
+
+    Those of effects of the bare plant are in `plant.coefficients`.
 
     Args:
         values: checked parameter values by full name; missing ones have their defaults.

@@ -6,14 +6,11 @@
 from __future__ import annotations
 
 import math
-import sys
-from pathlib import Path
 
 from fjr_interface.parameters import Value
+from fjr_kit.document_tables import renew
 
 from . import CATALOGUE, Effect, EffectParameter
-
-BEGIN, END = "<!-- catalogue: begin -->", "<!-- catalogue: end -->"
 
 
 def table() -> str:
@@ -51,18 +48,7 @@ def _number(value: Value) -> str:
     return "infinity" if value == math.inf else f"{value:g}"
 
 
-def in_step(document: str) -> str:
-    """Return a document with the present table between its marks."""
-    before, begin, rest = document.partition(BEGIN)
-    _, end, after = rest.partition(END)
-    if not begin or not end:
-        raise ValueError(f"the document lacks the marks {BEGIN} and {END}")
-    return f"{before}{BEGIN}\n\n{table()}\n\n{END}{after}"
-
+TABLES = {"catalogue": table()}
 
 if __name__ == "__main__":
-    if len(sys.argv) > 1:
-        path = Path(sys.argv[1])
-        path.write_text(in_step(path.read_text(encoding="utf-8")), encoding="utf-8")
-    else:
-        print(table())
+    renew(TABLES)

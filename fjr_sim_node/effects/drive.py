@@ -10,6 +10,8 @@ _SHARES = (0.15, 0.25, 0.4, 0.5, 0.6, 0.7, 0.75, 0.8, 0.85, 0.9, 0.94, 0.97, 1.0
 """Torque limits over the greatest commanded torque: which peaks are clipped changes from one to
 the next, and a knee is felt below its limit."""
 
+_PERIODS = (0.1, 0.5, 3.0, 10.0, 30.0)
+
 DRIVE: tuple[Effect, ...] = (
     Effect(
         "torque_bias",
@@ -19,7 +21,7 @@ DRIVE: tuple[Effect, ...] = (
         "DC only",
         "drive offset",
         (size("torque_nm", "N m", "Constant torque", -1e4),),
-        ({"torque_nm": (0.3,)},),
+        ({"torque_nm": (0.002,)},),
         looks_like="constant torque",
     ),
     Effect(
@@ -30,7 +32,7 @@ DRIVE: tuple[Effect, ...] = (
         "even lines, falling with amplitude",
         "Petrovic et al. 2000, IEEE Trans. Control Systems Technology 8(6)",
         ripple("amplitude_nm", "N m", 1e4, "the torque ripple"),
-        ripple_starts("amplitude_nm", 0.3),
+        ripple_starts("amplitude_nm", 0.002),
         looks_like="constant torque",
         ripple=True,
     ),
@@ -41,8 +43,8 @@ DRIVE: tuple[Effect, ...] = (
         "simulation.rig:hold",
         "phase, growing with frequency",
         "transport delay of bus and drive",
-        (size("time_s", "s", "Transport delay", 0.0, 0.01, fit=(0.0, 2e-3)),),
-        ({"time_s": (1e-4, 5e-4)},),
+        (size("time_s", "s", "Transport delay", 0.0, 0.1),),
+        ({"time_s": _PERIODS},),
         looks_like="late torque",
     ),
     Effect(
@@ -52,9 +54,8 @@ DRIVE: tuple[Effect, ...] = (
         "simulation.rig:hold",
         "phase as delay, gain falls too",
         "first-order current loop",
-        (size("time_constant_s", "s", "Time constant", 0.0, 0.1, negligible=5e-6,
-              fit=(0.0, 5e-3)),),
-        ({"time_constant_s": (1e-4, 5e-4)},),
+        (size("time_constant_s", "s", "Time constant", 0.0, 0.1, negligible=0.005),),
+        ({"time_constant_s": _PERIODS},),
         looks_like="late torque",
     ),
     Effect(
@@ -70,6 +71,54 @@ DRIVE: tuple[Effect, ...] = (
             EffectParameter("knee", 0.0, "", "Share of the limit over which it bends", 0.0, 1.0),
         ),
         ({"limit_nm": _SHARES, "knee": (0.1,)},),
+    ),
+    Effect(
+        "torque_speed_limit",
+        "The drive gives less torque the faster the motor turns, since its voltage is limited.",
+        "drive",
+        "plant.torques:available",
+        "highest amplitude only, where torque and velocity have one sign",
+        "torque-speed line of a direct-current motor, Krause et al. 2013, ch. 2",
+        (
+            EffectParameter("stall_nm", math.inf, "N m", "Greatest torque at rest; .inf: no limit",
+                            1e-6, role="limit"),
+            EffectParameter("no_load_rad_s", 100.0, "rad/s", "Motor speed at which no torque is "
+                            "left in its direction", 1e-3, 1e6, fit=(0.5, 100.0)),
+        ),
+        ({"stall_nm": (0.5, 0.7, 0.85, 1.0, 1.4, 2.5), "no_load_rad_s": (2.5, 5.0, 12.0)},),
+        contains=("torque_saturation",),
+    ),
+    Effect(
+        "torque_slew_limit",
+        "The torque of the drive changes at a limited rate.",
+        "drive",
+        "simulation.rig:driven",
+        "highest amplitude only, phase there",
+        "rate limiter; limited current rise at the supply's voltage",
+        (EffectParameter("limit_nm_s", math.inf, "N m/s", "Greatest rate; .inf: no limit", 1e-3,
+                         role="limit", fit=(1e-3, 4.0)),),
+        ({"limit_nm_s": (0.02, 0.04, 0.07, 0.1, 0.15, 0.2, 0.3, 0.4, 0.55, 0.7, 0.9)},),
+    ),
+    Effect(
+        "dead_band",
+        "The drive ignores small torque commands and shortens all others by as much.",
+        "drive",
+        "simulation.rig:driven",
+        "low amplitude only, as Coulomb friction but also where the motor does not move",
+        "dead zone of an amplifier; Tao, Kokotovic 1994, IEEE TAC 39(1)",
+        (size("width_nm", "N m", "Half width of the dead band"),),
+        ({"width_nm": (0.003, 0.03)},),
+    ),
+    Effect(
+        "torque_constant_ripple",
+        "The torque per command ripples with the motor angle.",
+        "drive",
+        "plant.torques:torque_ripple",
+        "even lines, flat with amplitude",
+        "Petrovic et al. 2000, IEEE Trans. Control Systems Technology 8(6), current-dependent part",
+        ripple("amplitude", "", 1.0, "the torque constant, relative"),
+        ripple_starts("amplitude", 0.02),
+        ripple=True,
     ),
     Effect(
         "torque_gain",
@@ -94,7 +143,7 @@ ENCODER: tuple[Effect, ...] = (
         "noise-like",
         "uniform quantiser",
         (size("resolution_rad", "rad", "One count", 0.0, 1.0),),
-        ({"resolution_rad": (1e-4, 5e-4)},),
+        ({"resolution_rad": (2e-5, 2e-4, 1.5e-3, 8e-3)},),
     ),
     Effect(
         "encoder_eccentricity",
@@ -104,7 +153,7 @@ ENCODER: tuple[Effect, ...] = (
         "nearly invisible",
         "once-per-turn measurement error",
         (
-            size("amplitude_rad", "rad", "Amplitude of the angle error", 0.0, 0.5),
+            size("amplitude_rad", "rad", "Amplitude of the angle error", 0.0, 0.5, absolute=True),
             angle("phase_rad", "Phase at angle zero"),
         ),
         ({"amplitude_rad": (1e-3, 3e-2), "phase_rad": QUARTERS},),

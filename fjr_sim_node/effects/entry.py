@@ -10,9 +10,10 @@ from fjr_interface.parameters import Parameter
 
 Part = Literal["motor", "transmission", "link", "drive", "encoder", "time"]
 """What of a rig an effect acts on."""
-Role = Literal["size", "limit", "harmonic", "angle", "shape"]
+Role = Literal["size", "limit", "harmonic", "angle", "cycles", "shape"]
 """What a parameter is to a fit: a size is zero and a limit infinite while the effect is off; a
-harmonic is the size of an optional second harmonic; an angle turns and has no size of its own."""
+harmonic is the size of an optional second harmonic; an angle turns and has no size of its own;
+cycles count ripples per turn."""
 Start = Mapping[str, tuple[float, ...]]
 """Starting values by parameter name; all combinations are tried."""
 
@@ -21,24 +22,37 @@ Start = Mapping[str, tuple[float, ...]]
 class EffectParameter(Parameter):
     """One parameter of an effect.
 
+    `low` and `high` are physical limits, in its unit. What fits need is relative to a scale of the
+    record, which follows from the unit and the part that the effect acts on.
+
     Attributes:
         role: what it is to a fit.
         fit: narrower bounds than `low` and `high`, beyond which data say nothing or the loop
-            diverges; None for those.
+            diverges, relative; None for those.
         negligible: size below which the effect counts as off, since it would only make the plant
-            stiff.
+            stiff, relative.
+        absolute: whether fits take it in its unit whatever the record, as what belongs to one turn.
         of_link: whether it belongs to the link alone, which a rigid axis does not have.
+        adds_to: bare parameter that it adds to, for datasheets that lack it: fits free it only
+            where that is zero. Empty for all others.
     """
 
     role: Role = "shape"
     fit: tuple[float, float] | None = None
     negligible: float = 0.0
+    absolute: bool = False
     of_link: bool = False
+    adds_to: str = ""
 
-    @property
-    def fit_bounds(self) -> tuple[float, float]:
-        """Least and greatest value that a fit may take."""
-        return self.fit or (self.low, self.high)
+    def fit_bounds(self, scale: float) -> tuple[float, float]:
+        """Return the least and the greatest value that a fit may take.
+
+        Args:
+            scale: of the record, in the parameter's unit.
+        """
+        if self.fit is None:
+            return self.low, self.high
+        return max(self.low, self.fit[0] * scale), min(self.high, self.fit[1] * scale)
 
     @property
     def may_be_negative(self) -> bool:
@@ -58,13 +72,18 @@ class Effect:
         telltale: how it shows in the data.
         source: where the parametrisation comes from.
         parameters: its parameters, sizes first; the defaults switch it off.
-        starts: where fits begin; empty for what only a gate looks for. Starts of a limit are
-            shares of the greatest torque of the record.
+        starts: where fits begin, relative to the scales of the record (those of a limit to its
+            greatest torque); empty for what only a gate looks for.
         looks_like: name of the family of effects that a motor-side encoder can hardly tell apart;
             empty if nothing is that near.
         same_as: what it equals exactly, in words; empty if nothing.
         ripple: whether it is periodic in the motor angle, so that `cycles_per_turn` is searched.
         scales: whether it scales the parameters of the bare plant, wholly or about one angle.
+        contains: effects that it holds as limit cases, which explain what they can with less.
+        of_bare_plant: whether it is the bare plant with other values, so that its kernel is the
+            bare one.
+        axis: which axes can have it; empty: flexible ones if it acts on transmission or link, else
+            both.
     """
 
     identifier: str
@@ -79,6 +98,9 @@ class Effect:
     same_as: str = ""
     ripple: bool = False
     scales: bool = False
+    contains: tuple[str, ...] = ()
+    of_bare_plant: bool = False
+    axis: Literal["", "both", "rigid"] = ""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -94,7 +116,12 @@ class Effect:
     @property
     def on_rigid_axis(self) -> bool:
         """Whether a rig without a flexible transmission can have it."""
-        return self.acts_on not in ("transmission", "link")
+        return bool(self.axis) or self.acts_on not in ("transmission", "link")
+
+    @property
+    def on_flexible_axis(self) -> bool:
+        """Whether a rig with a flexible transmission can have it."""
+        return self.axis != "rigid"
 
     @property
     def full_parameters(self) -> tuple[EffectParameter, ...]:
@@ -115,11 +142,14 @@ def size(
     negligible: float = 0.0,
     of_link: bool = False,
     fit: tuple[float, float] | None = None,
+    absolute: bool = False,
+    adds_to: str = "",
 ) -> EffectParameter:
     """Return a size: zero while the effect is off."""
     return EffectParameter(
         name, 0.0, unit, description, low, high,
-        role="size", fit=fit, negligible=negligible, of_link=of_link,
+        role="size", fit=fit, negligible=negligible, of_link=of_link, absolute=absolute,
+        adds_to=adds_to,
     )  # fmt: skip
 
 
@@ -128,8 +158,6 @@ def angle(name: str, description: str) -> EffectParameter:
     return EffectParameter(name, 0.0, "rad", description, -7.0, 7.0, role="angle")
 
 
-_CYCLES = (1.0, 2.0, 4.0, 8.0, 16.0, 24.0, 36.0, 52.0, 72.0, 96.0, 120.0)
-"""Ripples per turn to try where the loop cannot be repeated; else a search finds better."""
 QUARTERS = (0.0, 1.5707963267948966)
 """Phases of which any other is a sum."""
 
@@ -140,7 +168,7 @@ def ripple(name: str, unit: str, most: float, what: str) -> tuple[EffectParamete
         size(name, unit, f"Amplitude of {what}", 0.0, most),
         EffectParameter(
             "cycles_per_turn", 1.0, "", "Periods in one turn of the motor angle", 0.01, 1e4,
-            fit=(0.3, 250.0),
+            role="cycles",
         ),
         angle("phase_rad", "Phase at angle zero"),
         EffectParameter(
@@ -151,5 +179,5 @@ def ripple(name: str, unit: str, most: float, what: str) -> tuple[EffectParamete
 
 
 def ripple_starts(name: str, amplitude: float) -> tuple[Start, ...]:
-    """Return the coarse grid of starts of what is periodic in the motor angle."""
-    return ({name: (amplitude,), "cycles_per_turn": _CYCLES, "phase_rad": QUARTERS},)
+    """Return the starts of what is periodic in the motor angle, cycles left to the record."""
+    return ({name: (amplitude,), "phase_rad": QUARTERS},)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from .entry import Effect, EffectParameter, ripple, ripple_starts, size
+import math
 
-_STRIBECK_STARTS = ({"torque_nm": (0.3, 2.0), "velocity_rad_s": (0.02, 0.1, 0.5)},)
+from .entry import Effect, EffectParameter, Start, ripple, ripple_starts, size
+
+_STRIBECK_STARTS = ({"torque_nm": (0.002, 0.015), "velocity_rad_s": (0.0025, 0.0125, 0.06, 0.3)},)
+_SHORT = (3e-4, 3e-3, 3e-2)
 _ARMSTRONG = "Armstrong-Helouvry, Dupont, Canudas de Wit 1994, Automatica 30(7)"
 
 
@@ -13,12 +16,52 @@ def _stribeck(side: str) -> tuple[EffectParameter, ...]:
         size("torque_nm", "N m", f"Breakaway above Coulomb friction, {side} side"),
         EffectParameter(
             "velocity_rad_s", 0.1, "rad/s", "Stribeck velocity, where it has fallen to 1/e",
-            1e-4, 100.0, fit=(0.01, 5.0),
+            1e-4, 100.0, fit=(1e-3, 0.6),
         ),
     )  # fmt: skip
 
 
+def _lacking(
+    quantity: str, name: str, unit: str, motor: str, link: str
+) -> tuple[EffectParameter, ...]:
+    return (
+        size(f"motor_{name}", unit, f"{quantity} of the motor beyond {motor}", adds_to=motor),
+        size(f"link_{name}", unit, f"{quantity} of the link beyond {link}", adds_to=link,
+             of_link=True),
+    )  # fmt: skip
+
+
+def _on_either_side(name: str, values: tuple[float, ...]) -> tuple[Start, ...]:
+    motor, link = f"motor_{name}", f"link_{name}"
+    both = tuple({motor: (value,), link: (value,)} for value in values)
+    return ({motor: values, link: (0.0,)}, {motor: (0.0,), link: values}, *both)
+
+
 FRICTION: tuple[Effect, ...] = (
+    Effect(
+        "coulomb_friction",
+        "There is Coulomb friction where the datasheet has none.",
+        "motor",
+        "plant.flexible_joint:with_added",
+        "low amplitude, damped at all frequencies",
+        "paper eq. 2, fs sgn(q')",
+        _lacking("Coulomb friction", "nm", "N m", "fsm", "fs"),
+        _on_either_side("nm", (0.02, 0.2)),
+        same_as="a larger fsm or fs",
+        of_bare_plant=True,
+    ),
+    Effect(
+        "viscous_friction",
+        "There is viscous friction where the datasheet has none.",
+        "motor",
+        "plant.flexible_joint:with_added",
+        "resonance damped at all amplitudes, low frequencies lower",
+        "paper eq. 2, fv q'",
+        _lacking("Viscous friction", "nm_s_rad", "N m s/rad", "fvm", "fv"),
+        _on_either_side("nm_s_rad", (0.02,)),
+        same_as="a larger fvm or fv",
+        of_bare_plant=True,
+    ),
     Effect(
         "stribeck_friction_motor",
         "Motor friction is higher at breakaway and falls with velocity.",
@@ -53,8 +96,8 @@ FRICTION: tuple[Effect, ...] = (
                  "the directions", -1e4),
         ),
         (
-            {"coulomb_nm": (0.3,), "viscous_nm_s_rad": (0.0,)},
-            {"coulomb_nm": (0.0,), "viscous_nm_s_rad": (0.2,)},
+            {"coulomb_nm": (0.002,), "viscous_nm_s_rad": (0.0,)},
+            {"coulomb_nm": (0.0,), "viscous_nm_s_rad": (0.01,)},
         ),
         looks_like="constant torque",
         same_as="a torque bias while the motor slides, where only Coulomb friction differs",
@@ -63,17 +106,39 @@ FRICTION: tuple[Effect, ...] = (
         "presliding_friction",
         "Friction builds up over a small displacement before sliding, as a stiff spring does.",
         "motor",
-        "plant.torques:build_up",
+        "plant.presliding:bristle_torque",
         "low amplitude, phase lead at the resonance",
         "Dahl 1968, TOR-158(3107-18); de Wit et al. 1995, IEEE TAC 40(3), without bristle damping",
         (
             size("motor_rad", "rad", "Displacement over which motor friction builds up", 0.0, 1.0,
-                 negligible=2e-6),
+                 negligible=3e-5),
             size("link_rad", "rad", "Displacement over which link friction builds up", 0.0, 1.0,
-                 negligible=2e-6, of_link=True),
+                 negligible=3e-5, of_link=True),
         ),
         # A side that starts below what is negligible never leaves it.
-        ({"motor_rad": (2e-5, 2e-4, 2e-3), "link_rad": (2e-5, 2e-4, 2e-3)},),
+        ({"motor_rad": _SHORT, "link_rad": _SHORT},),
+    ),
+    Effect(
+        "lugre_friction",
+        "Motor friction is that of bristles which bend, slip and hold less while they move.",
+        "motor",
+        "plant.motion:motor_friction",
+        "low amplitude, a spring before sliding and a lower level beyond",
+        "Canudas de Wit, Olsson, Astrom, Lischinsky 1995, IEEE TAC 40(3); its damping, passive",
+        (
+            size("stribeck_nm", "N m", "Stribeck level: breakaway above Coulomb friction"),
+            EffectParameter("bristle_nm_rad", math.inf, "N m/rad", "Stiffness of the bristles, "
+                            "sigma0; .inf: none", 1e-3, role="limit", fit=(0.01, 1e3)),
+            EffectParameter("velocity_rad_s", 0.1, "rad/s", "Stribeck velocity, where it has "
+                            "fallen to 1/e", 1e-4, 100.0, fit=(1e-3, 0.6)),
+            EffectParameter("damping_nm_s_rad", 0.0, "N m s/rad", "Damping of the bristles, "
+                            "sigma1, while they bend further", 0.0, 1e4),
+        ),
+        (
+            {"stribeck_nm": (0.01,), "bristle_nm_rad": (1.0, 10.0, 100.0),
+             "velocity_rad_s": (0.0025, 0.0125, 0.06), "damping_nm_s_rad": (0.005,)},
+        ),
+        contains=("stribeck_friction_motor", "presliding_friction"),
     ),
     Effect(
         "load_friction",
@@ -86,6 +151,26 @@ FRICTION: tuple[Effect, ...] = (
         ({"coefficient": (0.01, 0.05)},),
     ),
     Effect(
+        "directional_loss",
+        "The gear loses torque, forward another share than backward.",
+        "transmission",
+        "plant.torques:motor_level",
+        "as load friction, other where the load drives the motor",
+        "Wang, Kim 2015, IFToMM; gear efficiency forward and backward",
+        (
+            size("forward", "", "Friction per transmitted torque while the motor drives", 0.0,
+                 0.95, fit=(0.0, 0.5)),
+            size("backward", "", "Friction per transmitted torque while the load drives", 0.0,
+                 0.95, fit=(0.0, 0.5)),
+        ),
+        (
+            {"forward": (0.01, 0.05), "backward": (0.0,)},
+            {"forward": (0.0,), "backward": (0.01, 0.05)},
+        ),
+        same_as="load_friction with all parameters behind the gear scaled, while the motor slides",
+        contains=("load_friction",),
+    ),
+    Effect(
         "position_friction",
         "Motor Coulomb friction varies with the motor angle.",
         "motor",
@@ -93,7 +178,7 @@ FRICTION: tuple[Effect, ...] = (
         "even lines, small gain",
         "Armstrong 1988, position-dependent friction of geared joints",
         ripple("amplitude_nm", "N m", 1e4, "the variation of Coulomb friction"),
-        ripple_starts("amplitude_nm", 0.3),
+        ripple_starts("amplitude_nm", 0.002),
         ripple=True,
     ),
     Effect(
@@ -108,8 +193,8 @@ FRICTION: tuple[Effect, ...] = (
             size("link_nm_s2_rad2", "N m s2/rad2", "Drag on the link", of_link=True),
         ),
         (
-            {"motor_nm_s2_rad2": (0.05,), "link_nm_s2_rad2": (0.0,)},
-            {"motor_nm_s2_rad2": (0.0,), "link_nm_s2_rad2": (0.05,)},
+            {"motor_nm_s2_rad2": (0.02,), "link_nm_s2_rad2": (0.0,)},
+            {"motor_nm_s2_rad2": (0.0,), "link_nm_s2_rad2": (0.02,)},
         ),
     ),
     Effect(

@@ -1,4 +1,4 @@
-"""The table of effects: transmission and link, which a rigid axis does not have."""
+"""The table of effects: transmission and link."""
 
 from __future__ import annotations
 
@@ -6,19 +6,20 @@ import numpy as np
 
 from .entry import Effect, EffectParameter, angle, ripple, ripple_starts, size
 
-_MODES_HZ = tuple(np.geomspace(4.0, 100.0, 44).tolist())
-"""Frequencies of a light third mass, which shows in a band as narrow as its damping."""
+_MODES = tuple(np.geomspace(0.08, 2.0, 44).tolist())
+"""Frequencies of a light third mass over the highest with signal: it shows in a band as narrow as
+its damping."""
 
 TRANSMISSION: tuple[Effect, ...] = (
     Effect(
         "backlash",
         "The transmission has a dead zone.",
         "transmission",
-        "plant.torques:spring_torque",
+        "plant.transmission:spring_torque",
         "low amplitude, more gain at 2-13 Hz",
         "Nordin, Gutman 2002, Automatica 38(10), dead-zone model",
         (size("half_gap_rad", "rad", "Half the dead zone of the deflection", 0.0, 1.0),),
-        ({"half_gap_rad": (2e-4, 1e-3, 4e-3)},),
+        ({"half_gap_rad": (2e-3, 0.01, 0.04, 0.2)},),
         looks_like="dead or soft zone",
         same_as="a soft zone of zero stiffness (piecewise_stiffness with soft_ratio 0)",
     ),
@@ -26,51 +27,61 @@ TRANSMISSION: tuple[Effect, ...] = (
         "piecewise_stiffness",
         "The transmission is soft around zero deflection and stiffer beyond (strain-wave gear).",
         "transmission",
-        "plant.torques:spring_torque",
+        "plant.transmission:spring_torque",
         "near backlash, which it contains",
         "Spong 1987; manufacturers' three-slope stiffness of strain-wave gears",
         (
             size("zone_rad", "rad", "Half width of the soft zone", 0.0, 1.0),
             EffectParameter("soft_ratio", 0.5, "", "Stiffness in the soft zone over k0", 0.0, 1.0),
         ),
-        ({"zone_rad": (1e-3, 4e-3, 2e-2, 6e-2), "soft_ratio": (0.4, 0.9)},),
+        ({"zone_rad": (0.01, 0.04, 0.2, 0.6), "soft_ratio": (0.4, 0.9)},),
         looks_like="dead or soft zone",
+    ),
+    Effect(
+        "asymmetric_stiffness",
+        "The transmission is stiffer in one direction than in the other.",
+        "transmission",
+        "plant.transmission:spring_torque",
+        "even lines and DC, growing as the amplitude",
+        "bilinear spring, k0 (1 + relative sgn d)",
+        (size("relative", "", "Half the difference of the stiffnesses over k0", -0.95, 0.95),),
+        ({"relative": (0.02,)},),
     ),
     Effect(
         "hysteresis",
         "The transmission torque depends on the history of the deflection.",
         "transmission",
-        "plant.torques:transmitted_torque",
+        "plant.transmission:transmitted_torque",
         "antiresonance damped",
         "Dahl 1968 on the deflection; the rate-independent Bouc-Wen model with n = 1",
         (
             size("torque_nm", "N m", "Half height of the hysteresis loop"),
             EffectParameter("displacement_rad", 1e-3, "rad", "Deflection over which it builds up",
-                            1e-6, 1.0, fit=(5e-5, 0.3)),
+                            1e-6, 1.0, fit=(5e-4, 3.0)),
         ),
-        ({"torque_nm": (0.5, 4.0), "displacement_rad": (3e-4, 3e-3, 2e-2)},),
+        ({"torque_nm": (0.003, 0.03), "displacement_rad": (3e-3, 0.03, 0.2)},),
         looks_like="loss in the transmission",
     ),
     Effect(
         "transmission_damping",
         "The transmission has a viscous term.",
         "transmission",
-        "plant.torques:transmitted_torque",
+        "plant.transmission:transmitted_torque",
         "resonance damped at mid and high amplitude",
         "Spong 1987, ASME J. Dyn. Syst. 109(4), with joint damping",
         (size("nm_s_rad", "N m s/rad", "Torque per deflection velocity"),),
-        ({"nm_s_rad": (0.1, 1.0)},),
+        ({"nm_s_rad": (0.005, 0.05)},),
         looks_like="loss in the transmission",
     ),
     Effect(
         "kinematic_error",
         "The gear transmits an angle that is off periodically with the motor angle.",
         "transmission",
-        "plant.torques:deflection",
+        "plant.transmission:deflection",
         "even lines, flat with amplitude",
         "Tuttle, Seering 1996, IEEE Trans. Robotics and Automation 12(3)",
         ripple("amplitude_rad", "rad", 1.0, "the angle error"),
-        ripple_starts("amplitude_rad", 3e-4),
+        ripple_starts("amplitude_rad", 3e-3),
         ripple=True,
     ),
     Effect(
@@ -83,15 +94,15 @@ TRANSMISSION: tuple[Effect, ...] = (
         (
             size("inertia_kg_m2", "kg m2", "Inertia of the third mass", 0.0, 1e3),
             EffectParameter("frequency_hz", 30.0, "Hz", "Its natural frequency with the link held",
-                            0.1, 2000.0, fit=(2.0, 120.0)),
+                            0.1, 2000.0, fit=(0.04, 2.4)),
             EffectParameter("damping_ratio", 0.02, "", "Its damping ratio with the link held",
                             0.0, 2.0, fit=(0.0, 0.5)),
         ),
         (
-            {"inertia_kg_m2": (1e-3,), "frequency_hz": _MODES_HZ, "damping_ratio": (0.03,)},
+            {"inertia_kg_m2": (2e-3,), "frequency_hz": _MODES, "damping_ratio": (0.03,)},
             {
-                "inertia_kg_m2": (2e-2,),
-                "frequency_hz": (8.0, 15.0, 22.0, 30.0, 40.0, 55.0),
+                "inertia_kg_m2": (0.04,),
+                "frequency_hz": (0.16, 0.3, 0.44, 0.6, 0.8, 1.1),
                 "damping_ratio": (0.03,),
             },
         ),
@@ -107,8 +118,34 @@ TRANSMISSION: tuple[Effect, ...] = (
             size("torque_nm", "N m", "Greatest gravity torque m g l"),
             angle("angle_rad", "Angle of the link from hanging down at q = 0"),
         ),
-        ({"torque_nm": (0.5, 4.0), "angle_rad": (0.0, np.pi / 2, np.pi)},),
+        ({"torque_nm": (0.003, 0.03), "angle_rad": (0.0, np.pi / 2, np.pi)},),
         looks_like="constant torque",
         same_as="cogging of one cycle per turn, on a rigid axis",
+        axis="both",
+    ),
+    Effect(
+        "transmission_stiffness",
+        "The transmission yields where the datasheet has it rigid.",
+        "transmission",
+        "plant.flexible_joint:with_added",
+        "resonance and antiresonance where an inertia alone has none",
+        "paper eqs. 2 and 3 with k1 = 0; Spong 1987, ASME J. Dyn. Syst. 109(4)",
+        (
+            size("compliance_rad_nm", "rad/N m", "Deflection per transmitted torque, 1/k0",
+                 negligible=1e-3),
+            EffectParameter("link_inertia_share", 0.5, "", "Share of the inertia behind the "
+                            "transmission", 0.01, 0.99),
+            EffectParameter("link_coulomb_share", 0.0, "", "Share of Coulomb friction behind the "
+                            "transmission", 0.0, 1.0),
+            EffectParameter("link_viscous_share", 0.0, "", "Share of viscous friction behind the "
+                            "transmission", 0.0, 1.0),
+        ),
+        (
+            {"compliance_rad_nm": (0.02, 0.2, 1.0), "link_inertia_share": (0.3, 0.7),
+             "link_coulomb_share": (0.3,), "link_viscous_share": (0.3,)},
+        ),
+        same_as="a finite k0",
+        of_bare_plant=True,
+        axis="rigid",
     ),
 )  # fmt: skip

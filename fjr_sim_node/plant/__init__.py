@@ -1,4 +1,10 @@
-"""The flexible-joint plant, compiled: torques, smooth motion, stick and slip, step size."""
+"""The flexible-joint plant, compiled (paper eqs. 2-5).
+
+Begin with `flexible_joint`: parameters, and the motion under a held torque. `torques` holds the
+laws of plant and effects, `presliding` friction before slip. `motion` is one Runge-Kutta step
+between events, `stick_slip` finds when that ends and which way each side goes, `step_size` chooses
+the step.
+"""
 
 from .flexible_joint import (
     FS,
@@ -13,7 +19,9 @@ from .flexible_joint import (
     advance,
     advance_with_effects,
     coefficients,
+    moves_as_one,
     rigid_sums,
+    with_added,
 )
 
 __all__ = [
@@ -29,5 +37,7 @@ __all__ = [
     "advance",
     "advance_with_effects",
     "coefficients",
+    "moves_as_one",
     "rigid_sums",
+    "with_added",
 ]

@@ -23,6 +23,8 @@ from typing import Any
 from fjr_interface.parameters import Parameter, ParameterGroup
 from fjr_kit.compiled import jit
 
+from .. import effects as fx
+from .places import FS, FSM, FV, FVM, JM, K0, K1, J
 from .presliding import with_bristles
 from .step_size import fastest_rate, pushes, reach, reach_within_energy
 from .stick_slip import (
@@ -33,7 +35,7 @@ from .stick_slip import (
     motor_direction,
     remembered,
 )
-from .torques import FS, FSM, FV, FVM, JM, K0, K1, J, deflection, deflection_speed, spring_region
+from .transmission import deflection, deflection_speed, spring_region
 
 __all__ = ["FS", "FSM", "FV", "FVM", "JM", "K0", "K1", "PLANT", "J", "advance", "coefficients"]
 
@@ -66,6 +68,16 @@ _CHEAP_SUBSTEPS = 8  # above, a second bound on the stiffness is worth its cost
 _MAX_SUBSTEPS = 10_000
 
 
+def moves_as_one(values: Mapping[str, Any]) -> bool:
+    """Tell whether motor and link are one body: a rigid axis whose transmission does not yield.
+
+    Args:
+        values: bare parameters and those of effects by full name; missing effects are off.
+    """
+    compliance = values.get("transmission_stiffness.compliance_rad_nm", 0.0)
+    return math.isinf(values["k0"]) and compliance == 0.0
+
+
 def rigid_sums(parameters: Mapping[str, Any]) -> dict[str, float] | None:
     """Return inertia and friction of the one body of a rigid axis (k0 infinite), else None.
 
@@ -77,14 +89,45 @@ def rigid_sums(parameters: Mapping[str, Any]) -> dict[str, float] | None:
     return {a: float(parameters[a]) + float(parameters[b]) for a, b in sums}
 
 
-def coefficients(parameters: Mapping[str, Any]) -> tuple[float, ...]:
-    """Return the 8 parameters in the order that `advance` expects.
+def with_added(values: Mapping[str, Any]) -> dict[str, float]:
+    """Return the bare parameters with what effects of the bare plant add to them.
 
-    A rigid axis is a motor with all the inertia and friction, and a link that nothing moves.
+    Args:
+        values: bare parameters and those of effects by full name; missing effects are off.
     """
+    own = {name: float(values[name]) for name in PLANT.names}
+    for parameter in fx.PARAMETERS:
+        if parameter.adds_to:
+            own[parameter.adds_to] += values.get(parameter.name, 0.0)
+    alone = rigid_sums(own)
+    if alone is None or moves_as_one(values):
+        return own
+    inertia, coulomb, viscous = (
+        values[f"transmission_stiffness.link_{of}_share"]
+        for of in ("inertia", "coulomb", "viscous")
+    )
+    return {
+        "jm": (1.0 - inertia) * alone["jm"],
+        "j": inertia * alone["jm"],
+        "fs": coulomb * alone["fsm"],
+        "fsm": (1.0 - coulomb) * alone["fsm"],
+        "fv": viscous * alone["fvm"],
+        "fvm": (1.0 - viscous) * alone["fvm"],
+        "k0": 1.0 / values["transmission_stiffness.compliance_rad_nm"],
+        "k1": 0.0,
+    }
+
+
+def coefficients(values: Mapping[str, Any]) -> tuple[float, ...]:
+    """Return the 8 parameters in the order that `advance` expects, as `with_added` gives them.
+
+    A rigid axis is a motor with all the inertia and friction, and a link of infinite inertia,
+    which nothing moves.
+    """
+    parameters = with_added(values)
     alone = rigid_sums(parameters)
     if alone is not None:
-        apart = dict.fromkeys(PLANT.names, 0.0) | {"j": 1.0}
+        apart = dict.fromkeys(PLANT.names, 0.0) | {"j": math.inf}
         parameters = apart | alone
     return tuple(float(parameters[parameter.name]) for parameter in PLANT)
 
@@ -94,10 +137,10 @@ def _advance(s, torque, w, duration, p, e):
     """Return state and build-up after a duration of constant torque."""
     link, motor = pushes(s, torque, w, p, e)
     twist = reach(s, link, motor, duration, p, e)
-    steps = fastest_rate(twist, s, p, e) * duration / _PHASE_PER_STEP
+    steps = fastest_rate(twist, s, torque, p, e) * duration / _PHASE_PER_STEP
     if steps > _CHEAP_SUBSTEPS:
         twist = min(twist, reach_within_energy(s, link, motor, duration, p, e))
-        steps = fastest_rate(twist, s, p, e) * duration / _PHASE_PER_STEP
+        steps = fastest_rate(twist, s, torque, p, e) * duration / _PHASE_PER_STEP
     if not (steps < _MAX_SUBSTEPS and math.isfinite(torque)):
         nan = math.nan
         return (nan, nan, nan, nan, nan, nan, nan), w

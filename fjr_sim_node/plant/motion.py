@@ -17,24 +17,17 @@ import math
 from fjr_kit.compiled import inlined, jit
 
 from .. import effects as fx
-from .presliding import bristle_torque
+from .places import FS, FSM, JM, LINK_BRISTLES, MOTOR_BRISTLES, J
+from .presliding import bristle_damping, bristle_torque
 from .torques import (
-    FS,
-    FSM,
-    JM,
-    LINK_BRISTLES,
-    MOTOR_BRISTLES,
-    J,
-    build_up,
-    deflection,
     link_drive,
     link_level,
     link_viscous,
     motor_drive,
     motor_level,
     motor_viscous,
-    transmitted_torque,
 )
+from .transmission import build_up, deflection, transmitted_torque
 
 
 @inlined
@@ -65,14 +58,21 @@ def link_friction(s, m, w, p, e):
 
 
 @inlined
+def motor_built_up(s, level, m, w, p):
+    """Return the torque of the motor's bristles (N m) at a Coulomb level."""
+    return bristle_torque(w[1], w[7], level, m[1], s[2] - w[4], p[MOTOR_BRISTLES])
+
+
+@inlined
 def motor_friction(s, te, m, w, p, e):
-    """Return Coulomb friction of the motor (N m)."""
+    """Return Coulomb friction of the motor (N m), with the damping of its bristles."""
     if e is None:
         return p[FSM] * m[1]
     level = motor_level(abs(s[3]), m[1], s[2], te, p, e)
     if p[MOTOR_BRISTLES] == 0.0:
         return level * m[1]
-    return bristle_torque(w[1], w[7], level, m[1], s[2] - w[4], p[MOTOR_BRISTLES])
+    built = motor_built_up(s, level, m, w, p)
+    return built + bristle_damping(built, level, m[1], s[3], e)
 
 
 @inlined
@@ -84,13 +84,13 @@ def link_torque(s, te, p, e):
 
 
 @inlined
-def motor_torque(s, te, torque, e):
+def motor_torque(s, te, torque, p, e):
     """Return the torque that drives the motor against its Coulomb friction."""
     if e is None:
-        return motor_drive(s[2], te, torque, e)
+        return motor_drive(s[2], s[3], te, torque, p, e)
     if e[fx.ACTUATOR_LAG_TIME_CONSTANT_S] != 0.0:
         torque = s[6]
-    return motor_drive(s[2], te, torque, e)
+    return motor_drive(s[2], s[3], te, torque, p, e)
 
 
 @inlined
@@ -104,7 +104,7 @@ def derivative(s, torque, m, w, p, e):
         aq = (link_torque(s, te, p, e) - friction) / p[J]
     if m[1] != 0.0:
         friction = motor_viscous(s[3], p, e) + motor_friction(s, te, m, w, p, e)
-        ath = (motor_torque(s, te, torque, e) - friction) / p[JM]
+        ath = (motor_torque(s, te, torque, p, e) - friction) / p[JM]
     if e is None:
         return s[1], aq, s[3], ath, 0.0, 0.0, 0.0
     a3 = 0.0

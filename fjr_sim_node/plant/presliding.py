@@ -6,7 +6,8 @@ Dahl's law with the torque F as the state, and the Coulomb level L of the moment
 
 The bristles hold F^2 / (2 sigma), and F dx less what they gain is |dx| F^2 / L >= 0. So the law
 takes energy whatever L does along the way, for sigma never changes: L may depend on velocity,
-direction, angle and load. `p` and `e` are parameters as in `torques`.
+direction, angle and load. LuGre adds the damping of bristles; here they damp only while they bend
+further, for it could push else where L has just fallen. `p` and `e` are parameters as in `torques`.
 """
 
 from __future__ import annotations
@@ -16,21 +17,25 @@ import math
 from fjr_kit.compiled import inlined
 
 from .. import effects as fx
-from .torques import FS, FSM, FV, FVM, JM, K0, K1, J, motor_level_bound
+from .places import FS, FSM, FV, FVM, JM, K0, K1, J
+from .torques import motor_level_bound
 
 
 @inlined
 def with_bristles(p, factor, e):
     """Return the bare parameters, friction times a factor, then the bristles' stiffnesses.
 
-    Stiffness (N m/rad) is the highest level without load and drift over the displacement. It is 0,
-    which is Coulomb friction at once, without presliding and where all friction is that of load.
+    Stiffness (N m/rad) is the highest level without load and drift over the displacement, or that
+    of the LuGre law. It is 0, which is Coulomb friction at once, without presliding and where all
+    friction is that of load.
     """
     link, motor = 0.0, 0.0
     if e[fx.PRESLIDING_FRICTION_LINK_RAD] != 0.0:
         link = (p[FS] + e[fx.STRIBECK_FRICTION_LINK_TORQUE_NM]) / e[fx.PRESLIDING_FRICTION_LINK_RAD]
     if e[fx.PRESLIDING_FRICTION_MOTOR_RAD] != 0.0:
         motor = motor_level_bound(0.0, p, e) / e[fx.PRESLIDING_FRICTION_MOTOR_RAD]
+    if e[fx.LUGRE_FRICTION_BRISTLE_NM_RAD] != math.inf:
+        motor = e[fx.LUGRE_FRICTION_BRISTLE_NM_RAD]
     return (
         p[JM],
         p[J],
@@ -43,6 +48,29 @@ def with_bristles(p, factor, e):
         link,
         motor,
     )
+
+
+@inlined
+def has_motor_bristles(e):
+    """Tell whether friction of the motor builds up."""
+    lugre = e[fx.LUGRE_FRICTION_BRISTLE_NM_RAD] != math.inf
+    return lugre or e[fx.PRESLIDING_FRICTION_MOTOR_RAD] != 0.0
+
+
+@inlined
+def bristle_damping(built, level, direction, speed, e):
+    """Return the damping of the motor's bristles (N m): sigma1 dz/dt, never against the slip.
+
+    Args:
+        built: torque of the bristles (N m).
+        level: Coulomb level (N m).
+        direction: direction of the motion, +-1.
+        speed: velocity (rad/s).
+        e: effects.
+    """
+    if e[fx.LUGRE_FRICTION_DAMPING_NM_S_RAD] == 0.0 or direction * built >= level:
+        return 0.0
+    return e[fx.LUGRE_FRICTION_DAMPING_NM_S_RAD] * (1.0 - direction * built / level) * speed
 
 
 @inlined

@@ -10,20 +10,9 @@ import math
 from fjr_kit.compiled import inlined, jit
 
 from .. import effects as fx
-from .torques import (
-    FS,
-    FV,
-    FVM,
-    JM,
-    K0,
-    K1,
-    LINK_BRISTLES,
-    MOTOR_BRISTLES,
-    J,
-    deflection,
-    deflection_speed,
-    motor_level_bound,
-)
+from .places import FS, FV, FVM, JM, K0, K1, LINK_BRISTLES, MOTOR_BRISTLES, J, is_rigid
+from .torques import load_coefficient, motor_level_bound
+from .transmission import deflection, deflection_speed
 
 
 @inlined
@@ -31,13 +20,17 @@ def pushes(s, torque, w, p, e):
     """Return the greatest torques that may feed energy to link and motor (N m)."""
     if e is None:
         return 0.0, abs(torque)
-    motor = (
-        max(abs(torque), abs(s[6])) + abs(e[fx.TORQUE_BIAS_TORQUE_NM]) + e[fx.HYSTERESIS_TORQUE_NM]
-    )
+    ripples = 1.0 + e[fx.TORQUE_CONSTANT_RIPPLE_SECOND_RATIO]
+    motor = max(abs(torque), abs(s[6])) * (1.0 + e[fx.TORQUE_CONSTANT_RIPPLE_AMPLITUDE] * ripples)
+    motor += abs(e[fx.TORQUE_BIAS_TORQUE_NM]) + e[fx.HYSTERESIS_TORQUE_NM]
     motor += e[fx.COGGING_AMPLITUDE_NM] * (1.0 + e[fx.COGGING_SECOND_RATIO])
     if p[MOTOR_BRISTLES] != 0.0:
         motor += max(abs(w[1]), motor_level_bound(0.0, p, e))
-    link = e[fx.GRAVITY_TORQUE_NM] + e[fx.HYSTERESIS_TORQUE_NM]
+    link = e[fx.HYSTERESIS_TORQUE_NM]
+    if is_rigid(p):
+        motor += e[fx.GRAVITY_TORQUE_NM]
+    else:
+        link += e[fx.GRAVITY_TORQUE_NM]
     if p[LINK_BRISTLES] != 0.0:
         link += max(abs(w[0]), p[FS] + e[fx.STRIBECK_FRICTION_LINK_TORQUE_NM])
     if e[fx.EXTRA_MODE_INERTIA_KG_M2] != 0.0:
@@ -66,7 +59,11 @@ def reach_within_energy(s, link, motor, duration, p, e):
     """
     twist2 = deflection(s[0], s[2], e) ** 2
     kinetic = p[J] * s[1] * s[1] + p[JM] * s[3] * s[3]
-    energy = 0.5 * (kinetic + (p[K0] + 0.5 * p[K1] * twist2) * twist2)
+    stiff, soft = p[K0], p[K0]
+    if e is not None:
+        uneven = abs(e[fx.ASYMMETRIC_STIFFNESS_RELATIVE])
+        stiff, soft = p[K0] * (1.0 + uneven), p[K0] * (1.0 - uneven)
+    energy = 0.5 * (kinetic + (stiff + 0.5 * p[K1] * twist2) * twist2)
     root = motor / math.sqrt(2.0 * p[JM]) + link / math.sqrt(2.0 * p[J])
     slack = 0.0
     if e is not None:
@@ -75,14 +72,14 @@ def reach_within_energy(s, link, motor, duration, p, e):
         swing = rate * (s[4] - s[0])
         energy += 0.5 * e[fx.EXTRA_MODE_INERTIA_KG_M2] * (s[5] * s[5] + swing * swing)
     root = math.sqrt(energy) + duration * root
-    peak = math.sqrt(p[K0] * p[K0] + 4.0 * p[K1] * root * root)
+    peak = math.sqrt(soft * soft + 4.0 * p[K1] * root * root)
     if p[K1] > 0.0:
-        return slack + math.sqrt(max(peak - p[K0], 0.0) / p[K1])
-    return slack + root * math.sqrt(2.0 / p[K0]) if p[K0] > 0.0 else math.inf
+        return slack + math.sqrt(max(peak - soft, 0.0) / p[K1])
+    return slack + root * math.sqrt(2.0 / soft) if soft > 0.0 else math.inf
 
 
 @inlined
-def fastest_rate(twist, s, p, e):
+def fastest_rate(twist, s, torque, p, e):
     """Return in rad/s how fast the motion may oscillate or decay up to a deflection.
 
     The squared frequency is bounded by the sum over all springs of stiffness times mobility.
@@ -91,11 +88,12 @@ def fastest_rate(twist, s, p, e):
     decay = p[FV] / p[J] + p[FVM] / p[JM]
     if e is None:
         return math.sqrt(stiffness * (1.0 / p[J] + 1.0 / p[JM])) + decay
-    return _fastest_rate(stiffness, twist, decay, s, p, e)
+    return _fastest_rate(stiffness, twist, decay, s, torque, p, e)
 
 
 @jit
-def _fastest_rate(stiffness, twist, decay, s, p, e):
+def _fastest_rate(stiffness, twist, decay, s, torque, p, e):
+    stiffness += p[K0] * abs(e[fx.ASYMMETRIC_STIFFNESS_RELATIVE])
     te = stiffness * twist
     if e[fx.HYSTERESIS_TORQUE_NM] != 0.0:
         stiffness += e[fx.HYSTERESIS_TORQUE_NM] / e[fx.HYSTERESIS_DISPLACEMENT_RAD]
@@ -112,9 +110,13 @@ def _fastest_rate(stiffness, twist, decay, s, p, e):
         * (1.0 + 4.0 * e[fx.KINEMATIC_ERROR_SECOND_RATIO])
     )
     ratio = 1.0 + slope
-    mobility = 1.0 / p[J] + ratio * (ratio + e[fx.LOAD_FRICTION_COEFFICIENT]) / p[JM]
-    link = e[fx.GRAVITY_TORQUE_NM]
-    motor = (
+    mobility = 1.0 / p[J] + ratio * (ratio + load_coefficient(e)) / p[JM]
+    link, motor = p[LINK_BRISTLES], p[MOTOR_BRISTLES]
+    if is_rigid(p):
+        motor += e[fx.GRAVITY_TORQUE_NM]
+    else:
+        link += e[fx.GRAVITY_TORQUE_NM]
+    motor += (
         e[fx.COGGING_AMPLITUDE_NM]
         * e[fx.COGGING_CYCLES_PER_TURN]
         * (1.0 + 2.0 * e[fx.COGGING_SECOND_RATIO])
@@ -122,8 +124,6 @@ def _fastest_rate(stiffness, twist, decay, s, p, e):
     )
     friction = e[fx.POSITION_FRICTION_AMPLITUDE_NM] * e[fx.POSITION_FRICTION_CYCLES_PER_TURN]
     motor += friction * (1.0 + 2.0 * e[fx.POSITION_FRICTION_SECOND_RATIO])
-    link += p[LINK_BRISTLES]
-    motor += p[MOTOR_BRISTLES]
     decay += e[fx.TRANSMISSION_DAMPING_NM_S_RAD] * mobility
     decay += e[fx.STRIBECK_FRICTION_LINK_TORQUE_NM] / (
         e[fx.STRIBECK_FRICTION_LINK_VELOCITY_RAD_S] * p[J]
@@ -131,6 +131,10 @@ def _fastest_rate(stiffness, twist, decay, s, p, e):
     decay += e[fx.STRIBECK_FRICTION_MOTOR_TORQUE_NM] / (
         e[fx.STRIBECK_FRICTION_MOTOR_VELOCITY_RAD_S] * p[JM]
     )
+    decay += e[fx.LUGRE_FRICTION_STRIBECK_NM] / (e[fx.LUGRE_FRICTION_VELOCITY_RAD_S] * p[JM])
+    if e[fx.LUGRE_FRICTION_BRISTLE_NM_RAD] != math.inf:
+        decay += e[fx.LUGRE_FRICTION_DAMPING_NM_S_RAD] / p[JM]
+    decay += _decay_at_limit(s, torque, e) / p[JM]
     decay += 2.0 * e[fx.QUADRATIC_FRICTION_LINK_NM_S2_RAD2] * abs(s[1]) / p[J]
     decay += (
         2.0 * e[fx.QUADRATIC_FRICTION_MOTOR_NM_S2_RAD2] * abs(s[3])
@@ -145,6 +149,16 @@ def _fastest_rate(stiffness, twist, decay, s, p, e):
     if e[fx.ACTUATOR_LAG_TIME_CONSTANT_S] != 0.0:
         rate = max(rate, 0.2 / e[fx.ACTUATOR_LAG_TIME_CONSTANT_S])
     return rate
+
+
+@inlined
+def _decay_at_limit(s, torque, e):
+    """Return by how much the torque falls per speed where the drive's limit may be reached."""
+    stall, no_load = e[fx.TORQUE_SPEED_LIMIT_STALL_NM], e[fx.TORQUE_SPEED_LIMIT_NO_LOAD_RAD_S]
+    asked = max(abs(torque), abs(s[6]))
+    if stall == math.inf or asked < stall * (1.0 - 2.0 * abs(s[3]) / no_load):
+        return 0.0
+    return stall / no_load
 
 
 @inlined
@@ -163,4 +177,7 @@ def ripple_rate(vth, e):
     if e[fx.POSITION_FRICTION_AMPLITUDE_NM] != 0.0:
         second = e[fx.POSITION_FRICTION_SECOND_RATIO]
         cycles = max(cycles, _finest(e[fx.POSITION_FRICTION_CYCLES_PER_TURN], second))
+    if e[fx.TORQUE_CONSTANT_RIPPLE_AMPLITUDE] != 0.0:
+        second = e[fx.TORQUE_CONSTANT_RIPPLE_SECOND_RATIO]
+        cycles = max(cycles, _finest(e[fx.TORQUE_CONSTANT_RIPPLE_CYCLES_PER_TURN], second))
     return cycles * abs(vth)

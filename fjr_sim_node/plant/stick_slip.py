@@ -15,20 +15,18 @@ from .motion import (
     flex_state,
     link_friction,
     link_torque,
+    motor_built_up,
     motor_friction,
     motor_torque,
     runge_kutta,
     transmitted,
 )
-from .torques import (
-    LINK_BRISTLES,
-    MOTOR_BRISTLES,
+from .places import LINK_BRISTLES, MOTOR_BRISTLES
+from .torques import link_level, motor_has_coulomb, motor_level
+from .transmission import (
     deflection,
     deflection_speed,
     lever_slope,
-    link_level,
-    motor_has_coulomb,
-    motor_level,
     next_region,
     region_margin,
     region_slope,
@@ -76,7 +74,7 @@ def motor_direction(s, torque, m, w, p, e):
     if s[3] < 0.0:
         return -1.0
     te = transmitted(s, m, w, p, e)
-    drive = motor_torque(s, te, torque, e)
+    drive = motor_torque(s, te, torque, p, e)
     if e is not None and p[MOTOR_BRISTLES] != 0.0:
         return _creep_direction(drive - motor_friction(s, te, m, w, p, e), m[1])
     if not motor_has_coulomb(p, e):
@@ -125,7 +123,7 @@ def _motor_margin(s, torque, m, w, p, e):
     if m[1] != 0.0:
         return s[3] * m[1]
     te = transmitted(s, m, w, p, e)
-    drive = motor_torque(s, te, torque, e)
+    drive = motor_torque(s, te, torque, p, e)
     direction = 1.0 if drive > 0.0 else -1.0
     return motor_level(0.0, direction, s[2], te, p, e) - abs(drive)
 
@@ -220,17 +218,10 @@ def remembered(s, m, w, p, e):
     if p[LINK_BRISTLES] != 0.0:
         link = link_friction(s, m, w, p, e)
     if p[MOTOR_BRISTLES] != 0.0:
-        motor = motor_friction(s, transmitted(s, m, w, p, e), m, w, p, e)
-    return (
-        link,
-        motor,
-        flex_state(s, m, w, e),
-        s[0],
-        s[2],
-        deflection(s[0], s[2], e),
-        w[6],
-        w[7],
-    )
+        level = motor_level(abs(s[3]), m[1], s[2], transmitted(s, m, w, p, e), p, e)
+        motor = motor_built_up(s, level, m, w, p)
+    built_up = link, motor, flex_state(s, m, w, e)
+    return (*built_up, s[0], s[2], deflection(s[0], s[2], e), w[6], w[7])
 
 
 @inlined
@@ -250,7 +241,7 @@ def facing(s, m, w, p, e):
 def _breaks_away(which, s, torque, m, w, p, e):
     """Return the direction in which a stuck side starts to slip."""
     te = transmitted(s, m, w, p, e)
-    drive = link_torque(s, te, p, e) if which == 0 else motor_torque(s, te, torque, e)
+    drive = link_torque(s, te, p, e) if which == 0 else motor_torque(s, te, torque, p, e)
     return 1.0 if drive > 0.0 else -1.0
 
 

@@ -1,8 +1,9 @@
 """Closed-loop batch simulation: the compiled steps of the nodes, without the messages between.
 
-At sample k the encoder gives y = th + noise, the controller answers with u = C(r - y), and u is
-held to the next sample: the lockstep of the graph. A torque may be added to that of the controller:
-with the recorded torque added and the recorded position as the reference, the loop is an observer.
+At sample k the encoder gives y = th + noise, the controller answers with u = sat(C_r r - C_y y),
+and u is held to the next sample: the lockstep of the graph. A torque may be added to that of the
+controller: with the recorded torque added and the recorded position as the reference, the loop is
+an observer.
 """
 
 from __future__ import annotations
@@ -12,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from controller_node import pd_filtered, transfer_function
-from controller_node.transfer_function import Law, TransferFunction
+from controller_node.law import Law
+from controller_node.transfer_function import TransferFunction
 from fjr_kit.compiled import jit
 from fjr_kit.errors import InputError
 
@@ -52,13 +54,13 @@ def _run(reference, noise, sample_period, p, e, c, state, position, torque, link
 
 @jit
 def _run_law(
-    reference, added, noise, sample_period, substeps, p, e, b, a, limit, state,
+    reference, added, noise, sample_period, substeps, p, e, x, law, state,
     position, torque, link, motor,
 ):  # fmt: skip
-    x = np.zeros(b.size)
+    b, forward, a, limit = law
     for k in range(reference.size):
         y = rig.measure(state, noise[k], e)
-        u = added[k] + transfer_function.step(x, reference[k] - y, b, a, limit)
+        u = added[k] + transfer_function.step(x, reference[k], y, b, forward, a, limit)
         position[k], torque[k], link[k], motor[k] = y, u, state[rig.LINK], state[rig.MOTOR]
         for _ in range(substeps):
             rig.hold(state, u, sample_period / substeps, p, e)
@@ -79,7 +81,7 @@ def simulate(
         reference: r, float64 of shape (samples,) in rad.
         sample_rate_hz: rate of the samples.
         plant_coefficients: from `plant.coefficients`.
-        controller: from `pd_filtered.coefficients`, or a transfer function.
+        controller: from `law.law_of`.
         noise: encoder noise in rad, of shape (samples,); None for none.
         effects: from `effects.coefficients`; None for the bare plant.
         elapsed_s: time since the rig was switched on, for what drifts.
@@ -119,9 +121,10 @@ def simulate_law(
     *,
     added_torque: np.ndarray | None = None,
     start: tuple[float, float] = (0.0, 0.0),
+    controller_state: np.ndarray | None = None,
     substeps: int = 1,
 ) -> Trajectory:
-    """Simulate the loop of a transfer function; see `simulate`.
+    """Simulate the loop of any linear law, from any start; see `simulate`.
 
     Args:
         reference: r, float64 of shape (samples,) in rad.
@@ -133,25 +136,32 @@ def simulate_law(
         elapsed_s: time since the rig was switched on, for what drifts.
         added_torque: torque beside the controller's, (samples,) in N m; None for none.
         start: position (rad) and velocity (rad/s) of all bodies at the first sample.
+        controller_state: state of the law before it, such as its `steady_state` or the
+            `entering_state` of a record; None for zero.
         substeps: parts of a sample in which the plant is integrated, at least.
 
     Raises:
-        InputError: the motion diverged.
+        InputError: the motion diverged, or signals or state have another length than they must.
     """
     reference, noise, out = _prepared(reference, noise)
+    added = np.zeros(reference.size)
+    if added_torque is not None:
+        added = _of_length(added_torque, reference.size, "added_torque", "samples")
+    x = np.zeros(controller.states + 1)
+    if controller_state is not None:
+        x[:-1] = _of_length(controller_state, controller.states, "controller_state", "states")
     state = rig.at_rest(elapsed_s)
     state[:_BODIES] = start * (_BODIES // 2)
     _run_law(
         reference,
-        np.zeros(reference.size) if added_torque is None else added_torque,
+        added,
         noise,
         1.0 / sample_rate_hz,
         substeps,
         plant_coefficients,
         effects,
-        controller.numerator,
-        controller.denominator,
-        controller.limit_nm,
+        x,
+        controller.coefficients,
         state,
         out.position,
         out.torque,
@@ -166,8 +176,16 @@ def _prepared(
 ) -> tuple[np.ndarray, np.ndarray, Trajectory]:
     """Return reference and noise as the kernels take them, and room for the signals."""
     reference = np.ascontiguousarray(reference, float)
-    noise = np.zeros(reference.size) if noise is None else np.ascontiguousarray(noise, float)
+    if noise is None:
+        noise = np.zeros(reference.size)
+    noise = _of_length(noise, reference.size, "noise", "samples")
     return reference, noise, Trajectory(reference, *(np.empty(reference.size) for _ in range(4)))
+
+
+def _of_length(values: np.ndarray, length: int, name: str, unit: str) -> np.ndarray:
+    if np.shape(values) != (length,):
+        raise InputError(f"{name} must have {length} {unit}, not the shape {np.shape(values)}.")
+    return np.ascontiguousarray(values, float)
 
 
 def _finite(out: Trajectory, sample_rate_hz: float) -> Trajectory:

@@ -17,8 +17,9 @@ from ..plant import advance, advance_with_effects
 LINK, MOTOR = 0, 2
 """Where link and motor position (rad) stand in a rig's state."""
 
-_TIME, _HEAD, _RING = 10, 11, 12
-_RING_SIZE = 2048
+_TIME, _SLEWED, _HEAD, _RING = 10, 11, 12, 13
+_RING_SIZE = 16_384  # samples of the longest delay: 100 ms at 20 kHz, each in eight parts
+_SLEW_PARTS = 8
 
 
 def at_rest(elapsed_s: float = 0.0) -> np.ndarray:
@@ -67,8 +68,31 @@ def limited(command, limit, knee):
 
 
 @jit
+def driven(x, command, sample_period, e):
+    """Return the torque of the drive over a sample (N m): dead band, limit, slew limit, gain.
+
+    A torque that slews is held at its mean over the sample.
+    """
+    band = e[fx.DEAD_BAND_WIDTH_NM]
+    torque = command - min(max(command, -band), band)
+    torque = limited(torque, e[fx.TORQUE_SATURATION_LIMIT_NM], e[fx.TORQUE_SATURATION_KNEE])
+    if e[fx.TORQUE_SLEW_LIMIT_LIMIT_NM_S] != math.inf:
+        most = e[fx.TORQUE_SLEW_LIMIT_LIMIT_NM_S] * sample_period
+        change = torque - x[_SLEWED]
+        if abs(change) > most:
+            x[_SLEWED] += math.copysign(most, change)
+            torque = x[_SLEWED] - 0.5 * math.copysign(most, change)
+        else:
+            x[_SLEWED] = torque
+            torque -= 0.5 * change * abs(change) / most
+    return torque * (1.0 + e[fx.TORQUE_GAIN_RELATIVE_ERROR])
+
+
+@jit
 def hold(x, command, sample_period, p, e):
     """Advance the rig in place by one sample period under a held torque command.
+
+    A torque that slews is no held torque: it is followed in parts.
 
     Args:
         x: state from `at_rest`.
@@ -80,9 +104,14 @@ def hold(x, command, sample_period, p, e):
     if e is None:
         x[0], x[1], x[2], x[3] = advance(x[0], x[1], x[2], x[3], command, sample_period, p)
         return
-    torque = limited(command, e[fx.TORQUE_SATURATION_LIMIT_NM], e[fx.TORQUE_SATURATION_KNEE]) * (
-        1.0 + e[fx.TORQUE_GAIN_RELATIVE_ERROR]
-    )
+    parts = 1 if e[fx.TORQUE_SLEW_LIMIT_LIMIT_NM_S] == math.inf else _SLEW_PARTS
+    for _ in range(parts):
+        _hold_with_effects(x, command, sample_period / parts, p, e)
+
+
+@jit
+def _hold_with_effects(x, command, sample_period, p, e):
+    torque = driven(x, command, sample_period, e)
     friction = max(1.0 + e[fx.NONSTATIONARY_FRICTION_PER_S] * x[_TIME], 0.0)
     x[_TIME] += sample_period
     if e[fx.DELAY_TIME_S] == 0.0:
@@ -92,6 +121,9 @@ def hold(x, command, sample_period, p, e):
     x[_HEAD] = head
     x[_RING + head] = torque
     samples = e[fx.DELAY_TIME_S] / sample_period
+    if samples + 1.0 >= _RING_SIZE:
+        x[MOTOR] = math.nan  # older than what is remembered: ends as a motion that diverges
+        return
     whole = int(samples + 1e-9)  # a delay of whole samples is that, whatever its last bit
     before = x[_RING + (head - whole - 1) % _RING_SIZE]
     now = x[_RING + (head - whole) % _RING_SIZE]

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from controller_node.transfer_function import law_of
-from excitation_node import multisine
-from fjr_interface.experiment import Experiment
+from controller_node.law import law_of
+from excitation_node import multisine, record_experiment
+from fjr_interface.experiment import Experiment, RecordDescription
 from fjr_interface.parameters import Parameter, ParameterGroup
 from fjr_kit.errors import InputError
 
@@ -36,7 +36,12 @@ SIMULATOR = ParameterGroup(
 """Parameters of the simulated rig and of all effects, by the names of the node's parameters."""
 
 
-def encoder_noise(values: Mapping[str, Any], experiment: Experiment) -> np.ndarray:
+Run = Experiment | RecordDescription
+
+
+def encoder_noise(
+    values: Mapping[str, Any], experiment: Run, reference: np.ndarray | None = None
+) -> np.ndarray:
     """Return the encoder noise of one realization, float64 of shape (samples,), rad.
 
     White and Gaussian, seeded by noise_seed, level and realization, so that the node and the batch
@@ -45,14 +50,22 @@ def encoder_noise(values: Mapping[str, Any], experiment: Experiment) -> np.ndarr
     Raises:
         InputError: both noise parameters are given, or the ratio needs a loop that is not known.
     """
-    std = _noise_std(values, experiment)
+    reference = _reference(experiment) if reference is None else reference
+    std = _noise_std(values, experiment, reference)
     if std == 0.0:
-        return np.zeros(experiment.samples)
+        return np.zeros(reference.size)
     seed = [values["noise_seed"], experiment.level, experiment.realization]
-    return std * np.random.default_rng(seed).standard_normal(experiment.samples)
+    return std * np.random.default_rng(seed).standard_normal(reference.size)
 
 
-def _noise_std(values: Mapping[str, Any], experiment: Experiment) -> float:
+def _reference(experiment: Run) -> np.ndarray:
+    """Return all samples of the reference that a description stands for."""
+    if isinstance(experiment, Experiment):
+        return multisine.reference(experiment)
+    return record_experiment.record_reference(experiment)
+
+
+def _noise_std(values: Mapping[str, Any], experiment: Run, reference: np.ndarray) -> float:
     ratio, std = values["noise_snr_db"], values["noise_std_rad"]
     if math.isinf(ratio):
         return std
@@ -63,40 +76,54 @@ def _noise_std(values: Mapping[str, Any], experiment: Experiment) -> float:
             "noise_snr_db needs the controller in the experiment description; "
             "give noise_std_rad instead."
         )
-    position = _closed_loop(values, experiment, None).position
-    kept = position[experiment.transient_periods * experiment.samples_per_period :]
+    kept = _closed_loop(values, experiment, reference, None).position
+    if isinstance(experiment, Experiment):
+        kept = kept[experiment.transient_periods * experiment.samples_per_period :]
     return float(np.sqrt(np.mean(kept**2))) * 10.0 ** (-ratio / 20.0)
 
 
+def _elapsed_s(experiment: Run, samples: int) -> float:
+    if isinstance(experiment, Experiment):
+        return experiment.elapsed_s
+    before = experiment.level * experiment.realizations + experiment.realization
+    return before * samples / experiment.sample_rate_hz
+
+
 def _closed_loop(
-    values: Mapping[str, Any], experiment: Experiment, noise: np.ndarray | None
+    values: Mapping[str, Any], experiment: Run, reference: np.ndarray, noise: np.ndarray | None
 ) -> Trajectory:
     if experiment.controller is None:
         raise InputError("experiment description: controller is missing, so the loop is not known.")
     rate = experiment.sample_rate_hz
     run = simulate(
-        multisine.reference(experiment),
+        reference,
         rate,
         plant.coefficients(values),
         law_of(experiment.controller, rate),
         noise,
         effects.coefficients(values),
-        experiment.elapsed_s,
+        _elapsed_s(experiment, reference.size),
     )
-    return run if plant.rigid_sums(values) is None else replace(run, link=run.motor)
+    return replace(run, link=run.motor) if plant.moves_as_one(values) else run
 
 
-def run_realization(values: Mapping[str, Any], experiment: Experiment) -> Trajectory:
+def run_realization(
+    values: Mapping[str, Any], experiment: Run, reference: np.ndarray | None = None
+) -> Trajectory:
     """Simulate one described realization in batch, encoder noise included.
 
     Args:
         values: checked SIMULATOR values.
-        experiment: description with controller and phase_seed.
+        experiment: description with a controller whose gains are known.
+        reference: r, float64 (samples,) in rad; None makes it from the description: of a multisine
+            with phase_seed, or of a record that `describe_record` described.
 
     Returns:
-        The sampled signals, (samples,) each, the transient periods first.
+        The sampled signals, (samples,) each, transient periods first.
 
     Raises:
-        InputError: the description doesn't fix the run, or the motion diverges.
+        InputError: the description doesn't fix the run, or the motion diverged.
     """
-    return _closed_loop(values, experiment, encoder_noise(values, experiment))
+    reference = _reference(experiment) if reference is None else reference
+    noise = encoder_noise(values, experiment, reference)
+    return _closed_loop(values, experiment, reference, noise)

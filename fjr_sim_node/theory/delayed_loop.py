@@ -16,7 +16,6 @@ from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
-from scipy.signal import freqz
 
 from controller_node.transfer_function import TransferFunction
 
@@ -72,10 +71,10 @@ def spectral_radius(
 ) -> float:
     """Return the greatest magnitude of a pole of the closed loop; it is stable below 1."""
     transition, now, before, whole = _delayed(parameters, sample_rate_hz, delay_s)
-    past, states = whole + 1, law.numerator.size - 1
+    past, states = whole + 1, law.states
     size = 4 + past + states
     torque = np.zeros(size)  # of this sample, by plant state, past torques and state of the law
-    torque[_MOTOR] = -law.numerator[0]
+    torque[_MOTOR] = -law.position[0]
     if states:
         torque[4 + past] = 1.0
     torques = [torque, *np.eye(size)[4 : 4 + past]]
@@ -86,7 +85,7 @@ def spectral_radius(
     for i in range(states):
         row = loop[4 + past + i]
         row -= law.denominator[i + 1] * torque
-        row[_MOTOR] -= law.numerator[i + 1]
+        row[_MOTOR] -= law.position[i + 1]
         if i + 1 < states:
             row[4 + past + i + 1] += 1.0
     return float(np.abs(np.linalg.eigvals(loop)).max())
@@ -123,7 +122,7 @@ def _phase_margin_s(
 ) -> float:
     """Return the least phase margin over frequency of all gain crossovers (s)."""
     frequency_hz = np.geomspace(1e-4, 0.5, _FREQUENCIES) * sample_rate_hz
-    _, controller = freqz(law.numerator, law.denominator, frequency_hz, fs=sample_rate_hz)
+    _, controller = law.response(frequency_hz, sample_rate_hz)
     loop = controller * g0(parameters, frequency_hz, sample_rate_hz)
     above = np.abs(loop) > 1.0
     crossovers = np.flatnonzero(above[1:] != above[:-1])

@@ -9,14 +9,13 @@ import numpy as np
 
 from fjr_records.recorded import read_experiment
 from fjr_records.spectra import line_spectrum
-from fjr_sim_node import effects as fx
 from gap_diagnosis.model.simulated_rig import Model, Simulator
 from gap_diagnosis.outcome.diagnosis import Gap
+from gap_diagnosis.which.search_space import Scales
 
 _REPEATABILITY = 1e-3
 _NEIGHBOURS = 10
 _STEP = 2e-3
-_RANGES = {p.name: (p.negligible or p.fit_bounds[0], p.fit_bounds[1]) for p in fx.PARAMETERS}
 
 
 class Problem:
@@ -25,7 +24,7 @@ class Problem:
     Attributes:
         nominal: nominal bare parameters.
         equations: how many real residuals there are.
-        peak_torque_nm: greatest torque of the record.
+        scales: what is usual in the record.
     """
 
     def __init__(self, folder: Path, nominal: Mapping[str, float]) -> None:
@@ -36,7 +35,7 @@ class Problem:
         self._lines = recorded.lines
         spectra = [r.spectrum(r.position, self._lines) for r in recorded.realizations]
         self._measured = np.array([s.mean(0) for s in spectra])
-        self.peak_torque_nm = max(float(np.abs(r.torque).max()) for r in recorded.realizations)
+        self.scales = Scales.of_experiment(recorded, self.nominal)
         self._rms = np.array([np.std(r.kept(r.position)) for r in recorded.realizations])
         self._sigma = np.array([_line_sigma(s) for s in spectra])
         self.equations = 2 * self._measured.size
@@ -50,6 +49,14 @@ class Problem:
         difference = self._measured - line_spectrum(self._simulator.signals(model)[0], self._lines)
         parts = np.concatenate([difference.real / self._sigma, difference.imag / self._sigma])
         return np.where(np.isfinite(parts), parts, np.inf).ravel() * np.sqrt(2.0)
+
+    def within(self, name: str, value: float) -> float:
+        """Return the value of a parameter within its range; bare parameters stay positive."""
+        low, high = 1e-9, np.inf
+        if name not in self.nominal:
+            low, high = self.scales.bounds(name)
+            low = self.scales.negligible(name) or low
+        return float(np.clip(value, low, high))
 
     def gap(self, residual: np.ndarray) -> Gap:
         """Return the gap that a residual leaves, on the data of the fit."""
@@ -137,15 +144,9 @@ def _step(
         step = -np.linalg.lstsq(normal + damping * np.diag(np.diag(normal)), slope, rcond=None)[0]
         trial = dict(values)
         for name, change in zip(free, step, strict=True):
-            trial[name] = _within(name, values[name] + change * scale(name, values))
+            trial[name] = problem.within(name, values[name] + change * scale(name, values))
         after = problem.residual(trial)
         if after @ after < residual @ residual:
             return trial, after, max(0.1 * damping, 1e-8)
         damping *= 10.0
     return None
-
-
-def _within(name: str, value: float) -> float:
-    """Return the value within its range; bare parameters stay positive."""
-    low, high = _RANGES.get(name, (1e-9, np.inf))
-    return float(np.clip(value, low, high))

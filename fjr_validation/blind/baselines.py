@@ -16,10 +16,22 @@ from pathlib import Path
 import numpy as np
 
 from fjr_sim_node import effects as fx
-from gap_diagnosis.outcome.diagnosis import Candidate, Diagnosis, Estimate, Gaps, Verdict
+from gap_diagnosis.outcome.diagnosis import (
+    Candidate,
+    Diagnosis,
+    Estimate,
+    EvidenceKind,
+    Gaps,
+    Verdict,
+)
+from gap_diagnosis.which.catalogue import catalogue
 from gap_diagnosis.which.search_space import starts
 
 from .baseline_fit import Problem, fit, jacobian
+
+NOTHING_HELD_OUT = EvidenceKind(
+    noise="repeats", reported_on="none", controller="known", excitation="periodic"
+)
 
 _UNDETECTED = 1.5  # chi2 per equation below which there is nothing left to explain
 _STEPS_OF_EFFECT = 3
@@ -67,7 +79,7 @@ def refit_only(folder: Path, nominal: Mapping[str, float]) -> Diagnosis:
     return Diagnosis(
         verdict=refit.without_effect if explained else "unexplained",
         confidence=1.0,
-        reported_on="none",
+        evidence=NOTHING_HELD_OUT,
         gap=refit.gaps,
         parameters=_estimates(refit.values),
     )
@@ -80,12 +92,10 @@ def _projected(basis: np.ndarray, vector: np.ndarray) -> np.ndarray:
 def _features(refit: _Refit, basis: np.ndarray) -> list[tuple[str, dict[str, float], np.ndarray]]:
     """Return (effect, values, change of the residual beyond any refit) of every starting point."""
     found = []
-    for entry in fx.CATALOGUE:
-        if not entry.starts:
-            continue
-        effect = entry.identifier
-        cycles = _CYCLES if entry.ripple else None
-        for point in starts(effect, refit.problem.peak_torque_nm, cycles):
+    nominal = refit.problem.nominal
+    for effect in catalogue(nominal):
+        cycles = _CYCLES if fx.EFFECTS[effect].ripple else None
+        for point in starts(effect, refit.problem.scales, cycles, nominal):
             residual = refit.problem.residual({**refit.values, **point})
             if np.isfinite(residual).all():
                 found.append((effect, point, _projected(basis, residual - refit.residual)))
@@ -133,7 +143,7 @@ def _bic_verdict(refit: _Refit, outcomes: list[tuple[float, str, dict[str, float
         effects=[effect] if effect else [],
         equivalent=[[effect]] if effect else [],
         confidence=float(1.0 / weights.sum()),
-        reported_on="none",
+        evidence=NOTHING_HELD_OUT,
         gap=refit.gaps,
         ranking=[
             Candidate(
@@ -175,7 +185,7 @@ def sparse_regression(folder: Path, nominal: Mapping[str, float]) -> Diagnosis:
         effects=names,
         equivalent=[[name] for name in names],
         confidence=float(np.clip(1.0 - best / (left @ left), 0.0, 1.0)) if names else 1.0,
-        reported_on="none",
+        evidence=NOTHING_HELD_OUT,
         gap=refit.gaps,
         parameters=_estimates(refit.values),
     )

@@ -18,7 +18,7 @@ Method = Callable[[Path, Mapping[str, float]], Diagnosis]
 
 OURS = "fjr"
 METHODS: Mapping[str, tuple[str, str]] = {
-    OURS: ("gap_diagnosis.investigation", "diagnose"),
+    OURS: ("gap_diagnosis.any_record", "diagnose"),
     "refit": ("fjr_validation.blind.baselines", "refit_only"),
     "bic": ("fjr_validation.blind.baselines", "lowest_bic"),
     "sparse": ("fjr_validation.blind.baselines", "sparse_regression"),

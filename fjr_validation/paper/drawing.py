@@ -69,12 +69,6 @@ def log_values(axis: Axes) -> None:
     axis.yaxis.set_minor_formatter(NullFormatter())
 
 
-def decibel(values: np.ndarray) -> np.ndarray:
-    """Return 20 log10 |values|; NaN where they are zero."""
-    size = np.abs(values)
-    return 20.0 * np.log10(np.where(size > 0, size, np.nan))
-
-
 def decibel_power(values: np.ndarray) -> np.ndarray:
     """Return 10 log10 of positive values; NaN elsewhere."""
     return 10.0 * np.log10(np.where(values > 0, values, np.nan))

@@ -9,10 +9,11 @@ import numpy as np
 
 from bla_analyzer.bla.fast import fast_bla
 from bla_analyzer.checks import periodicity
+from bla_analyzer.results.summary import decibel
 from fjr_bringup.design.measured import simulate_level
 from fjr_kit.tasks import Arrays, Task
 
-from . import agreement, drawing, fig9
+from . import agreement, fig9
 from .fig7_to_9_drawing import (
     FIG9_TITLE,
     fast_figure,
@@ -152,7 +153,7 @@ def _statements(results: Mapping[str, Arrays]) -> tuple[Statement, ...]:
     seven, seven_clean = results["fig7_noise"], results["fig7"]
     eight, clean = results["fig8_noise"], results["fig8"]
     # The least gain of both curves tells whether the antiresonance is masked.
-    depth = np.ptp(drawing.decibel(seven["g_viscous"])[_band(seven, 9, 14)])
+    depth = np.ptp(decibel(seven["g_viscous"])[_band(seven, 9, 14)])
     seen = fit_level(results["fig9_friction_noise"])
     return (
         Statement(

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from bla_analyzer.results.summary import decibel
 from fjr_kit.plots import Options, layout
 from fjr_kit.tasks import Arrays
 
@@ -31,9 +32,9 @@ def state(result: Arrays) -> str:
 
 def _fast_curves(result: Arrays) -> tuple[tuple[str, np.ndarray, str], ...]:
     return (
-        ("G0", drawing.decibel(result["g_viscous"]), G0),
-        ("FRF", drawing.decibel(result["g"]), BLA),
-        (PREDICTED, drawing.decibel(result["predicted"]), PREDICTION),
+        ("G0", decibel(result["g_viscous"]), G0),
+        ("FRF", decibel(result["g"]), BLA),
+        (PREDICTED, decibel(result["predicted"]), PREDICTION),
         (
             "nonlinear distortion variance",
             drawing.decibel_power(result["var_nonlinear"]),
@@ -82,18 +83,16 @@ def fig9_plot(results: Mapping[str, Arrays]) -> dict[str, Any]:
     """Return Fig. 9 as an interactive plot, with predictions, distortion and noise."""
     reference = results["fig9_both"]
     f = reference["frequency_hz"]
-    data = [
-        drawing.curve(f, drawing.decibel(reference["g_viscous"]), "G0", G0, unit=drawing.GAIN_DB)
-    ]
+    data = [drawing.curve(f, decibel(reference["g_viscous"]), "G0", G0, unit=drawing.GAIN_DB)]
     for name, color in FIG9:
         result = results[f"fig9_{name}_noise"]
-        gain = drawing.decibel(result["g"])
+        gain = decibel(result["g"])
         bla = drawing.curve(
             f, gain, f"BLA, {name}", color, unit=drawing.GAIN_DB, band=_band(result)
         )
         bla["error_y"] |= {"thickness": 0.5, "width": 0}
         data.append(bla)
-        predicted, shown = drawing.decibel(result["predicted"]), name != "transmission"
+        predicted, shown = decibel(result["predicted"]), name != "transmission"
         style: Options = {"dash": "dot", "visible": shown or "legendonly"}
         data.append(drawing.curve(f, predicted, f"predicted, {name}", color, **style))
         for key, words in (
@@ -111,7 +110,7 @@ def _band(result: Arrays) -> tuple[np.ndarray, np.ndarray]:
     """Return the 95 % interval of |G| in dB, from the confidence disc."""
     gain = np.abs(result["g"])
     lowest = np.maximum(gain - result["radius"], 1e-3 * gain)
-    return drawing.decibel(lowest), drawing.decibel(gain + result["radius"])
+    return decibel(lowest), decibel(gain + result["radius"])
 
 
 FIG9_TITLE = "Fig. 9: robust method"
@@ -135,13 +134,13 @@ def fig9_figure(results: Mapping[str, Arrays]) -> Figure:
     figure, axis = drawing.single()
     reference = results["fig9_both"]
     f = reference["frequency_hz"]
-    axis.plot(f, drawing.decibel(reference["g_viscous"]), color=G0, label="G0")
+    axis.plot(f, decibel(reference["g_viscous"]), color=G0, label="G0")
     labels = {"friction": "friction nonlinearity", "transmission": "transmission nonlinearity"}
     for name, color in FIG9:
         label = f"BLA {labels.get(name, 'both nonlinearities')}"
         result = results[f"fig9_{name}_noise"]
-        axis.plot(f, drawing.decibel(result["g"]), color=color, label=label, lw=0.9)
-        axis.plot(f, drawing.decibel(result["predicted"]), ":", color=color, lw=0.8)
+        axis.plot(f, decibel(result["g"]), color=color, label=label, lw=0.9)
+        axis.plot(f, decibel(result["predicted"]), ":", color=color, lw=0.8)
         axis.fill_between(f, *_band(result), color=color, alpha=0.2, lw=0)
     axis.plot([], [], "k:", lw=0.8, label="predicted")
     axis.set(xlim=(0, 50), ylim=(-90, 0), xlabel="frequency (Hz)")

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from bla_analyzer.compare.two_inertia import Resonances
+from bla_analyzer.results.summary import decibel
 from fjr_kit.plots import BARRED, LOG, Options, layout
 from fjr_kit.tasks import Arrays
 
@@ -107,7 +108,7 @@ def _heat(results: Mapping[str, Arrays], settings: Settings, case: str) -> PlotP
     levels = sweep(results, settings, case).levels
     frequency = levels[0]["frequency_hz"]
     chosen = (frequency >= 5.0) & (frequency <= 35.0)
-    gain = np.array([drawing.decibel(level["g"])[chosen] for level in levels])
+    gain = np.array([decibel(level["g"])[chosen] for level in levels])
     surface: dict[str, Any] = {
         "type": "heatmap",
         "x": np.round(frequency[chosen], 2).tolist(),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from controller_node.transfer_function import as_transfer_function, law_of
+from controller_node.law import as_transfer_function, law_of
 from fjr_kit.errors import InputError
 from fjr_records.recorded import RecordedExperiment
 from fjr_sim_node.simulation.closed_loop import simulate_law

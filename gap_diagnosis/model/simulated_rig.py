@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from controller_node.transfer_function import law_of
+from controller_node.law import law_of
 from fjr_kit.errors import InputError
 from fjr_records.noise import NoiseLevels, noise_levels
 from fjr_records.recorded import RecordedExperiment, RecordedRealization
@@ -64,10 +64,14 @@ class Model:
     def plant_coefficients(self) -> tuple[float, ...]:
         """Bare parameters as the compiled plant takes them."""
         if self.rigid:
-            return plant.coefficients(
-                {"j": 0.0, "fs": 0.0, "fv": 0.0, "k0": math.inf, **self.plant}
-            )
-        return plant.coefficients(self.plant)
+            none = dict.fromkeys(plant.PLANT.names, 0.0)
+            return plant.coefficients({**none, "k0": math.inf, **self.plant, **self.effects})
+        return plant.coefficients({**self.plant, **self.effects})
+
+    @property
+    def one_body(self) -> bool:
+        """Whether motor and link move as one."""
+        return plant.moves_as_one({"k0": math.inf, **self.plant, **self.effects})
 
     @property
     def effect_coefficients(self) -> tuple[float, ...] | None:
@@ -165,7 +169,7 @@ class Simulator:
             run = self._simulated(model, self._inputs[index], self._elapsed[index])
         except InputError:
             return np.full((3, self._samples), np.nan)
-        link = run.motor if model.rigid else run.link
+        link = run.motor if model.one_body else run.link
         return np.array([s[-self._samples :] for s in (run.position, run.torque, link)])
 
     def _simulated(

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controller_node.transfer_function import law_of
+from controller_node.law import law_of
 from fjr_kit.errors import InputError
 from fjr_records.recorded import RecordedExperiment
 from fjr_records.spectra import line_spectrum
@@ -165,7 +165,7 @@ class _Bench:
                 run = simulate(reference, self._rate, p, self._law, None, e)
             except InputError:
                 return np.full((3, self._samples), np.nan)
-            link = run.motor if model.rigid else run.link
+            link = run.motor if model.one_body else run.link
             return np.array([s[-self._samples :] for s in (run.position, run.torque, link)])
 
         return np.array(run_parallel(one, [trial.loaded(model) for model in models]))

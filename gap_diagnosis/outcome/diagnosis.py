@@ -1,4 +1,4 @@
-"""The outcome of a diagnosis: `diagnosis.json`, schema fjr_rig/diagnosis/1."""
+"""The outcome of a diagnosis: `diagnosis.json`, schema fjr_rig/diagnosis/2."""
 
 from __future__ import annotations
 
@@ -13,12 +13,14 @@ Verdict = Literal[
     "parameters_only",
     "effect",
     "ambiguous",
+    "partly_explained",
     "unexplained",
     "nonstationary",
     "bad_data",
 ]
-ReportedOn = Literal["records", "none"]
-LineKind = Literal["excited", "odd", "even", "dc"]
+ReportedOn = Literal["records", "blocks", "none"]
+Stage = Literal["nominal", "refit", "cause"]
+LineKind = Literal["excited", "odd", "even", "dc", "slow", "all"]
 
 
 class Estimate(ResultModel):
@@ -114,13 +116,91 @@ class GapFigures(ResultModel):
 
 
 class Place(ResultModel):
-    """Where the gap lies: a band of one level, one kind of line, one signal."""
+    """Where the gap lies: a band of one level, one kind of line, one signal.
+
+    Records that are not periodic have no kinds of line but `slow` (mean and slow motion) and `all`.
+    Sigma is the rms error over the standard deviation of the noise; NaN where noise is not known.
+    """
 
     level: int
     band_hz: Annotated[tuple[float, float], Unit("Hz")]
     lines: LineKind
     signal: Literal["position", "torque"]
     sigma: Number
+
+
+class Cause(ResultModel):
+    """An unmodelled effect that is present.
+
+    Attributes:
+        effect: its identifier.
+        others: effects that these data cannot tell from it.
+        present: probability that it, or one of the others, is there.
+        share: how much of the squared gap that the refit left comes back if the cause is left out
+            and all else is fitted anew.
+        invariance_p: how often chance alone makes its sizes differ so much between levels; None
+            where there is one level only.
+        where: where leaving it out shows most.
+        parameters: its parameters.
+    """
+
+    effect: str
+    others: list[str] = Field(default_factory=list, alias="or")
+    present: float = Field(ge=0.0, le=1.0)
+    share: Figure | None = None
+    invariance_p: OptionalNumber = None
+    where: list[Place] = Field(default_factory=list)
+    parameters: dict[str, Estimate] = Field(default_factory=dict)
+
+
+class Step(ResultModel):
+    """The gap that is left after a step of the explanation, on data that no fit has seen.
+
+    Attributes:
+        added: what was added: nothing (None) for the nominal and the refit, else the cause.
+        stage: nominal, refit, or cause.
+        nrmse_position, nrmse_torque: rms error over rms about the mean.
+        chi2_per_dof: mean squared error over the noise; None where noise is not known.
+    """
+
+    added: str | None
+    stage: Stage
+    nrmse_position: OptionalNumber
+    nrmse_torque: OptionalNumber
+    chi2_per_dof: OptionalNumber
+
+
+class Remainder(ResultModel):
+    """What all named causes leave.
+
+    Attributes:
+        nrmse_position: rms error over rms of the position.
+        share: of the squared gap that the refit left.
+        looks_like: what it goes with, strongest first; empty where it goes with nothing.
+        where: where it lies, strongest first.
+    """
+
+    nrmse_position: OptionalNumber
+    share: OptionalNumber
+    looks_like: list[str] = Field(default_factory=list)
+    where: list[Place] = Field(default_factory=list)
+
+
+class EvidenceKind(ResultModel):
+    """What a diagnosis rests on.
+
+    Attributes:
+        noise: how the noise is known.
+        reported_on: what the figures were computed on: whole records, or blocks of records, that
+            no fit has seen; none if the fit has seen all.
+        controller: whether the loop was simulated, with gains that were known or fitted, or not.
+        excitation: whether steady periods were compared, or records as they came.
+    """
+
+    noise: Literal["repeats", "standstill", "residual", "none"]
+    reported_on: ReportedOn
+    controller: Literal["known", "gains_fitted", "unknown"]
+    excitation: Literal["periodic", "record"]
 
 
 class Candidate(ResultModel):
@@ -158,12 +238,15 @@ class Diagnosis(Document):
 
     Attributes:
         verdict: what is said.
-        effects: the best explanation; empty unless the verdict is effect or ambiguous.
+        effects: the named causes; empty unless the verdict is effect, ambiguous or
+            partly_explained.
         equivalent: one set for each named effect: what the data cannot tell from it.
         confidence: calibrated probability that the verdict is right; capped where nothing was
             held out.
-        reported_on: what all figures were computed on: `records` that no fit has seen, or `none`
-            such, so that they are those of the fit itself.
+        evidence: what the diagnosis rests on; None where a gate stopped it.
+        causes: the named causes, greatest share first.
+        steps: the gap from step to step: nominal, refit, cause after cause.
+        remainder: what is left; None where nothing was fitted.
         gap: the gaps at each stage.
         gap_closed: share of what the refit left that the effect explains; None without an effect,
             and where a share means nothing.
@@ -176,12 +259,15 @@ class Diagnosis(Document):
         notes: sentences that a reader must see.
     """
 
-    schema_name: Literal["fjr_rig/diagnosis/1"] = Field("fjr_rig/diagnosis/1", alias="schema")
+    schema_name: Literal["fjr_rig/diagnosis/2"] = Field("fjr_rig/diagnosis/2", alias="schema")
     verdict: Verdict
     effects: list[str] = Field(default_factory=list)
     equivalent: list[list[str]] = Field(default_factory=list)
     confidence: float = Field(ge=0.0, le=1.0)
-    reported_on: ReportedOn = "records"
+    evidence: EvidenceKind | None = None
+    causes: list[Cause] = Field(default_factory=list)
+    steps: list[Step] = Field(default_factory=list)
+    remainder: Remainder | None = None
     gap: Gaps
     gap_closed: OptionalNumber = None
     gap_figures: GapFigures | None = None
@@ -191,3 +277,8 @@ class Diagnosis(Document):
     parameters: dict[str, Estimate] = Field(default_factory=dict)
     next_experiment: NextExperiment | None = None
     notes: list[str] = Field(default_factory=list)
+
+    @property
+    def reported_on(self) -> ReportedOn:
+        """What all figures were computed on."""
+        return "records" if self.evidence is None else self.evidence.reported_on

@@ -63,6 +63,15 @@ WORDS: dict[Verdict, Words] = {
         "The true one is in the set only if it is in the catalogue. Outside the recorded "
         "amplitudes and band the members of the set part.",
     ),
+    "partly_explained": Words(
+        "Partly explained",
+        "The named causes are there, by tests on data that no fit has seen; beyond them a gap "
+        "remains that no effect of the catalogue accounts for.",
+        "Go on with updated.yaml, which switches the named causes on, and look at what the "
+        "remainder looks like before you look for a further cause.",
+        "A cause stands for its law at the recorded amplitudes and in the recorded band only. The "
+        "remainder can hide weaker causes, and shifts what is named if it is the greater part.",
+    ),
     "unexplained": Words(
         "Unexplained",
         "A gap remains after the refit, and no explanation of the catalogue closes it.",
@@ -91,11 +100,12 @@ WORDS: dict[Verdict, Words] = {
 
 ON: dict[ReportedOn, str] = {
     "records": " on data that its fit has not seen",
+    "blocks": " on blocks of the records that its fit has not seen",
     "none": " on the data that it was fitted to (nothing was held out: no prediction was tested)",
 }
 """On which data an explanation closes the gap."""
 
-HELD_OUT: dict[ReportedOn, str] = {"records": "held-out", "none": "fitted"}
+HELD_OUT: dict[ReportedOn, str] = {"records": "held-out", "blocks": "held-out", "none": "fitted"}
 """What the data are called that all figures were computed on."""
 
 
@@ -122,7 +132,7 @@ def closed(diagnosis: Diagnosis) -> str:
     sure = ""
     if share is not None and share.low is not None and share.high is not None:
         sure = f" (95 %: {share.low:.1%} to {share.high:.1%})"
-    where = "" if diagnosis.reported_on == "records" else " on the data that were fitted"
+    where = " on the data that were fitted" if diagnosis.reported_on == "none" else ""
     return f"{diagnosis.gap_closed:.1%} of what the refit left is closed{where}{sure}."
 
 
@@ -143,11 +153,16 @@ def headline(diagnosis: Diagnosis) -> str:
     if not diagnosis.effects:
         return words
     if diagnosis.verdict == "ambiguous":
-        sets = "; ".join(
-            " or ".join(explanation([name]) for name in members) for members in diagnosis.equivalent
-        )
-        return f"An effect is missing: {sets}"
+        return f"An effect is missing: {_sets(diagnosis)}"
+    if diagnosis.verdict == "partly_explained":
+        return f"Missing: {_sets(diagnosis)}; a remainder stays"
     return f"Missing: {explanation(diagnosis.effects)}"
+
+
+def _sets(diagnosis: Diagnosis) -> str:
+    return "; ".join(
+        " or ".join(explanation([name]) for name in members) for members in diagnosis.equivalent
+    )
 
 
 def summaries(diagnosis: Diagnosis) -> list[str]:

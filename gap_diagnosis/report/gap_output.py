@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -12,20 +12,24 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure
 
 from bla_analyzer.output import provenance
-from controller_node.pd_filtered import CONTROLLER, from_description
+from controller_node.pd_filtered import CONTROLLER
 from excitation_node.multisine import EXCITATION
-from fjr_interface.experiment import Experiment
 from fjr_interface.parameter_file import save_parameter_file
 from fjr_interface.parameters import ParameterGroup
 from fjr_kit.atomic import result_folder
 from fjr_kit.figure_style import STYLE, save
-from fjr_records.recorded import RecordedExperiment
 from fjr_sim_node.simulation.simulator import SIMULATOR
 
 from ..investigation import Investigation
+from ..outcome.diagnosis import Diagnosis
+from ..record_investigation import RecordInvestigation
 from .gap_figures import draw_residual_torque, draw_sigma_lines, draw_sigma_maps
 from .gap_plots import STAGES
 from .gap_report import render_gap_report, stages
+from .record_figures import record_figures
+from .record_report import compared, render_record_report
+from .updated_parameters import updated_values
+from .waterfall import bars, draw_waterfall
 
 OWN_FILES = ("report.html", "diagnosis.json", "updated.yaml", "figures/*.p[nd][gf]")
 """What an earlier diagnosis may have left in a folder, as patterns."""
@@ -37,10 +41,11 @@ GROUPS: dict[str, ParameterGroup] = {
 }
 
 Progress = Callable[[str], None]
+Drawing = Callable[[], Figure]
 
 
 def write_diagnosis(
-    investigation: Investigation,
+    investigation: Investigation | RecordInvestigation,
     out: Path | str,
     *,
     progress: Progress = lambda _: None,
@@ -70,86 +75,39 @@ def write_diagnosis(
         (folder / "diagnosis.json").write_text(investigation.diagnosis.to_json(), encoding="utf-8")
         if investigation.diagnosis.parameters:
             progress("writing updated.yaml")
-            save_parameter_file(folder / "updated.yaml", updated_values(investigation), GROUPS)
-        _write_figures(investigation, folder / "figures", progress)
+            values = updated_values(investigation.recorded, investigation.diagnosis)
+            save_parameter_file(folder / "updated.yaml", values, GROUPS)
+        made = provenance(command, date)
+        if isinstance(investigation, RecordInvestigation):
+            found = compared(investigation)
+            drawings = record_figures(found, known=investigation.evidence.noise.known)
+            text = render_record_report(investigation, found, made)
+        else:
+            drawings = dict(_figures(investigation))
+            text = render_gap_report(investigation, made)
+        drawings = {**_waterfall(investigation.diagnosis), **drawings}
+        _write_figures(drawings, folder / "figures", progress)
         progress("writing report.html")
-        text = render_gap_report(investigation, provenance(command, date))
         (folder / "report.html").write_text(text, encoding="utf-8")
     return Path(out) / "report.html"
 
 
-def updated_values(investigation: Investigation) -> dict[str, dict[str, Any]]:
-    """Return the parameters of the better simulation by node, as nodes and campaigns take them.
-
-    Simulator: refitted base parameters and the named effect, without encoder noise. Controller and
-    sample rate: the recorded ones. Excitation: grid, levels and periods of the record, so that a
-    campaign plays the same kind of signal, with phases of its own.
-    """
-    recorded, diagnosis = investigation.recorded, investigation.diagnosis
-    description = recorded.experiment
-    rate = description.sample_rate_hz
-    simulator = {name: float(e.value) for name, e in diagnosis.parameters.items()}
-    SIMULATOR.check(simulator, "updated.yaml")
-    values: dict[str, dict[str, Any]] = {
-        "simulator": {"sample_rate_hz": rate, **simulator},
-        "excitation": {"sample_rate_hz": rate, **_excitation(recorded)},
-    }
-    if has_known_law(recorded):
-        values["controller"] = from_description(description.controller or {}, rate)
-    return values
-
-
-def has_known_law(recorded: RecordedExperiment) -> bool:
-    """Tell whether the recorded controller is one that nodes and campaigns can run."""
-    controller = recorded.experiment.controller
-    return controller is not None and controller.get("kind") == "pd_filtered"
-
-
-def _excitation(recorded: RecordedExperiment) -> dict[str, Any]:
-    """Return what the excitation node needs to play such an experiment."""
-    description = recorded.experiment
-    harmonics = description.excited_harmonics + description.detection_harmonics
-    f0 = description.base_frequency_hz
-    counts = [sum(r.level == level for r in recorded.realizations) for level in recorded.levels]
-    return {
-        "base_frequency_hz": f0,
-        "f_min_hz": min(harmonics) * f0,
-        "f_max_hz": max(harmonics) * f0,
-        "grid": _grid(description),
-        "amplitudes_rad": tuple(_amplitude(recorded, level) for level in recorded.levels),
-        "realizations": max(counts),
-        "periods": description.periods,
-        "transient_periods": description.transient_periods,
-    }
-
-
-def _amplitude(recorded: RecordedExperiment, level: int) -> float:
-    """Return the amplitude of a level as it was set; the rms over lines if lines differ."""
-    amplitudes = next(
-        r.experiment.amplitudes_rad for r in recorded.realizations if r.level == level
-    )
-    return float(amplitudes[0] if np.ptp(amplitudes) == 0.0 else np.sqrt(np.mean(amplitudes**2)))
-
-
-def _grid(description: Experiment) -> str:
-    if any(harmonic % 2 == 0 for harmonic in description.excited_harmonics):
-        return "full"
-    return "odd_random" if description.detection_harmonics else "odd"
-
-
-def _write_figures(investigation: Investigation, folder: Path, progress: Progress) -> None:
-    """Draw the figures, each as PNG and PDF; none where nothing was simulated."""
-    drawings = list(_figures(investigation))
+def _write_figures(drawings: Mapping[str, Drawing], folder: Path, progress: Progress) -> None:
+    """Draw figures by their names, each as PNG and PDF; none where nothing was simulated."""
     if not drawings:
         return
     folder.mkdir()
     with rc_context(STYLE):
-        for name, draw in drawings:
+        for name, draw in drawings.items():
             progress(f"drawing {name}")
             save(draw(), folder / name)
 
 
-def _figures(investigation: Investigation) -> Iterator[tuple[str, Callable[[], Figure]]]:
+def _waterfall(diagnosis: Diagnosis) -> dict[str, Drawing]:
+    return {"waterfall": partial(draw_waterfall, diagnosis)} if bars(diagnosis) else {}
+
+
+def _figures(investigation: Investigation) -> Iterator[tuple[str, Drawing]]:
     models = stages(investigation)
     if not models:
         return

@@ -5,7 +5,6 @@ Verdict, gates, where, which, how far; frame, style and plots are those of the B
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from typing import Any
 
@@ -15,10 +14,11 @@ from ..how_far.comparison import LevelComparison, compare
 from ..investigation import Investigation
 from ..model.misfit import MODEL_ERROR
 from ..model.simulated_rig import Model
-from ..outcome.verdict_words import HELD_OUT, WORDS, closed, headline, meaning, summaries
+from ..outcome.verdict_words import HELD_OUT
 from .gap_level_plots import level_plots
 from .gap_plots import ranking_plot, sigma_plot, torque_plot, where_plot
 from .gap_tables import candidates, distances, gap_table, gates, parameters, places
+from .outcome_values import origin, outcome_plots, outcome_values
 
 
 def stages(investigation: Investigation) -> dict[str, Model]:
@@ -49,17 +49,10 @@ def render_gap_report(investigation: Investigation, provenance: Mapping[str, str
         title=f"Sim-to-real gap of {recorded.source}",
         plots=_plots(investigation, found),
         provenance=_origin(investigation, provenance),
-        diagnosis=diagnosis,
         lead=_lead(investigation),
-        good=diagnosis.verdict in ("no_gap", "parameters_only", "effect"),
-        headline=headline(diagnosis),
-        meaning=meaning(diagnosis),
-        closed=closed(diagnosis),
-        words=WORDS[diagnosis.verdict],
-        summaries=summaries(diagnosis),
+        **outcome_values(diagnosis),
         gates=gates(investigation.gates),
         stages=len(stages(investigation)),
-        data=HELD_OUT[diagnosis.reported_on],
         tested=tested,
         model_error=MODEL_ERROR,
         noise_known=investigation.noise is not None,
@@ -78,7 +71,7 @@ def _explained(investigation: Investigation, found: list[LevelComparison]) -> di
         "places": places(diagnosis),
         "explanations": len(attribution.candidates) + 1,
         "candidates": candidates(attribution, diagnosis, investigation.held_size),
-        "parameters": parameters(attribution, diagnosis, investigation.nominal.plant),
+        "parameters": parameters(attribution.best.space, diagnosis, investigation.nominal.plant),
         "gap": gap_table(diagnosis),
         "distances": distances(found),
     }
@@ -92,7 +85,7 @@ def _plots(investigation: Investigation, found: list[LevelComparison]) -> dict[s
     """Return all plots: over all levels, and of each level."""
     attribution, maps = investigation.attribution, _shown_maps(investigation)
     data = HELD_OUT[investigation.diagnosis.reported_on]
-    overview: dict[str, Any] = {}
+    overview = outcome_plots(investigation.diagnosis)
     levels: list[dict[str, Any]] = [dict(level_plots(level)) for level in found]
     if attribution is None:
         return {"overview": overview, "levels": levels}
@@ -121,10 +114,10 @@ def _lead(investigation: Investigation) -> str:
 
 def _origin(investigation: Investigation, provenance: Mapping[str, str]) -> dict[str, str]:
     """Return where the numbers come from, by name."""
-    nominal = ", ".join(f"{k} {v:.6g}" for k, v in investigation.nominal.plant.items())
-    controller = json.dumps(investigation.recorded.experiment.controller, default=str)
-    folder = {"folder": investigation.recorded.source}
-    return {**folder, **provenance, "nominal": nominal, "controller": controller}
+    recorded = investigation.recorded
+    return origin(
+        recorded.source, recorded.experiment.controller, investigation.nominal, provenance
+    )
 
 
 def _bags(investigation: Investigation, tested: bool) -> list[str]:

@@ -13,12 +13,16 @@ from fjr_kit.page import Cell, Column, Mark, Row
 
 from ..gates.gate_checks import GateReport
 from ..how_far.comparison import LevelComparison, Response, bla_distance_db, bla_distance_sigma
+from ..outcome.cause_words import cause_name, digits, percent, place_words, share_words
 from ..outcome.diagnosis import Diagnosis, Estimate, Figure, Gap
 from ..outcome.verdict_words import explains, explanation, unit_of
 from ..which.attribution import Attribution
+from ..which.search_space import Space
 from .gap_level_plots import MODEL_STYLES
 
 MOST_PLACES = 12
+MOST_ACTS = 3
+"""How many places of one cause are shown."""
 LABELS = {k: label for k, (label, *_) in MODEL_STYLES.items()} | {"noise_floor": "noise floor"}
 
 
@@ -58,26 +62,53 @@ def _converged(converged: bool) -> Cell:
 
 
 def _estimate(name: str, estimate: Estimate) -> str:
-    short = name.split(".", 1)[1]
-    return f"{short} {estimate.value:.4g} [{estimate.low:.4g}, {estimate.high:.4g}]"
+    value, low, high = digits(estimate)
+    between = "" if low == high == "-" else f" [{low}, {high}]"
+    return f"{name.split('.', 1)[1]} {value}{between}"
 
 
-def parameters(
-    attribution: Attribution, diagnosis: Diagnosis, nominal: Mapping[str, float]
-) -> list[Row]:
+def causes(diagnosis: Diagnosis) -> list[Row]:
+    """Return each cause: name, presence, share, parameters, invariance, where it acts."""
+    return [
+        (
+            cause_name(cause),
+            percent(cause.present),
+            share_words(cause.share),
+            [f"{_estimate(n, e)} {unit_of(n)}".rstrip() for n, e in cause.parameters.items()],
+            "-" if cause.invariance_p is None else f"{cause.invariance_p:.2g}",
+            [place_words(place) for place in cause.where[:MOST_ACTS]],
+        )
+        for cause in diagnosis.causes
+    ]
+
+
+def tried(diagnosis: Diagnosis) -> list[Row]:
+    """Return each effect that was tried beside the causes before it: step, effect, gain, values."""
+    return [
+        (
+            str(len(candidate.effects)),
+            explanation(candidate.effects[-1:]),
+            nan if candidate.delta is None else candidate.delta,
+            _converged(candidate.converged),
+            [_estimate(n, e) for n, e in candidate.parameters.items()],
+        )
+        for candidate in diagnosis.ranking
+    ]
+
+
+def parameters(space: Space, diagnosis: Diagnosis, nominal: Mapping[str, float]) -> list[Row]:
     """Return name, unit, nominal value, estimate, interval, change (%) of what is shown."""
-    bounds = _bounds(attribution)
+    bounds = _bounds(space)
     rows: list[Row] = []
     for name, e in diagnosis.parameters.items():
         given = nominal.get(name, nan)
         change = 100.0 * (e.value / given - 1.0) if given else nan
         note: Cell = Mark("at its bound", "fail") if _at(e.value, bounds.get(name)) else ""
-        rows.append((name, unit_of(name), given, e.value, e.low, e.high, change, note))
+        rows.append((name, unit_of(name), given, *digits(e), change, note))
     return rows
 
 
-def _bounds(attribution: Attribution) -> Mapping[str, tuple[float, float]]:
-    space = attribution.best.space
+def _bounds(space: Space) -> Mapping[str, tuple[float, float]]:
     low, high = space.bounds()
     ends = space.model(low), space.model(high)
     return {name: (ends[0].plant[name], ends[1].plant[name]) for name in space.nominal}

@@ -22,19 +22,11 @@ from fjr_records.noise import NoiseLevels
 from fjr_records.recorded import RecordedExperiment, RecordedRealization
 from fjr_sim_node import effects as fx
 from fjr_sim_node.plant import advance, advance_with_effects
-from fjr_sim_node.plant.torques import (
-    FS,
-    FSM,
-    FV,
-    K0,
-    K1,
-    J,
-    motor_drive,
-    motor_level,
-    motor_viscous,
-    transmitted_torque,
-)
-from fjr_sim_node.simulation.rig import limited
+from fjr_sim_node.plant.places import FS, FSM, FV, K0, K1, J
+from fjr_sim_node.plant.presliding import bristle_damping, has_motor_bristles
+from fjr_sim_node.plant.torques import motor_drive, motor_level, motor_viscous
+from fjr_sim_node.plant.transmission import transmitted_torque
+from fjr_sim_node.simulation.rig import at_rest, driven
 
 from ..model.simulated_rig import Model
 
@@ -206,13 +198,11 @@ def _applied(
     hold = np.concatenate([[1.0], -np.expm1(-s_ts) / s_ts])
     if e is None:
         return lines * hold
-    given = [
-        limited(u, e[fx.TORQUE_SATURATION_LIMIT_NM], e[fx.TORQUE_SATURATION_KNEE])
-        for u in torque.tolist()
-    ]
-    lines = np.fft.rfft(given) * (1.0 + e[fx.TORQUE_GAIN_RELATIVE_ERROR])
+    drive = at_rest()
+    for _ in range(2):  # a torque that slews is periodic from the second period on
+        given = [driven(drive, u, 1.0 / rate, e) for u in torque.tolist()]
     return (
-        lines
+        np.fft.rfft(given)
         * hold
         * np.exp(-1j * omega * e[fx.DELAY_TIME_S])
         / (1.0 + 1j * omega * e[fx.ACTUATOR_LAG_TIME_CONSTANT_S])
@@ -276,12 +266,12 @@ def _missing_torque(states, rest, p, e):
     for k in range(out.shape[1]):
         th, vth, ath, q, vq, built, flex, u = states[:, k]
         te = transmitted_torque(q, vq, th, vth, flex, p, e)
-        balance = p[0] * ath + motor_viscous(vth, p, e) - motor_drive(th, te, u, e)
+        balance = p[0] * ath + motor_viscous(vth, p, e) - motor_drive(th, vth, te, u, p, e)
         if abs(vth) > rest:
             direction = 1.0 if vth > 0.0 else -1.0
             friction = direction * motor_level(abs(vth), direction, th, te, p, e)
-            if e is not None and e[fx.PRESLIDING_FRICTION_MOTOR_RAD] != 0.0:
-                friction = built
+            if e is not None and has_motor_bristles(e):
+                friction = built + bristle_damping(built, abs(friction), direction, vth, e)
         else:
             level = motor_level(0.0, 1.0 if balance < 0.0 else -1.0, th, te, p, e)
             friction = min(max(-balance, -level), level)

@@ -44,6 +44,7 @@ class Attribution:
         best: the explanation chosen; the refit if no effect is called for.
         tied: explanations that the data can't tell from the best, without it.
         explained: whether the best leaves nothing worth explaining.
+        complete: whether the search ended by itself, not by its time budget.
     """
 
     refit: Fit
@@ -51,6 +52,7 @@ class Attribution:
     best: Fit
     tied: tuple[Fit, ...]
     explained: bool
+    complete: bool = True
 
 
 def stands_out(left: float, refit: float, rival: float) -> float:

@@ -13,10 +13,11 @@ from fjr_sim_node import effects as fx
 
 from ..model.misfit import Misfit
 from ..model.simulated_rig import Model, Simulator
+from .catalogue import catalogue
 from .least_squares import Solution, solve
 from .ripples import RippleSearch
 from .screening import Proposal, Screening
-from .search_space import TOLERANCE, Space, space_for, starts
+from .search_space import TOLERANCE, Scales, Space, space_for, starts
 
 _KEPT_STARTS = 2
 _MOST_STEPS = 40
@@ -65,7 +66,8 @@ class Fitter:
         nominal: datasheet values of the base parameters.
         tolerance: how far a datasheet value may be off, relative.
         train, held: misfit of the realizations to fit, and of those to judge by.
-        peak_torque_nm: greatest torque of the record.
+        scales: what is usual in the record, the measures of starts and bounds.
+        catalogue: effects to look for.
     """
 
     def __init__(
@@ -77,6 +79,7 @@ class Fitter:
         train: Sequence[int],
         held: Sequence[int],
         tolerance: float = TOLERANCE,
+        effects: Sequence[str] | None = None,
     ) -> None:
         """Prepare.
 
@@ -88,7 +91,9 @@ class Fitter:
             train: realizations to fit.
             held: realizations to judge by.
             tolerance: how far a datasheet value may be off, relative.
+            effects: identifiers to look for; None for all.
         """
+        self.catalogue = catalogue(nominal, effects)
         self.recorded, self._simulator = recorded, simulator
         self._levels = [realization.level for realization in recorded.realizations]
         self._misfit = lambda which: Misfit(recorded, simulator, noise_std, which)
@@ -96,17 +101,7 @@ class Fitter:
         self.tolerance = tolerance
         self.train = Misfit(recorded, simulator, noise_std, train)
         self.held = Misfit(recorded, simulator, noise_std, held)
-        self.peak_torque_nm = max(float(np.abs(r.torque).max()) for r in recorded.realizations)
-
-    @property
-    def catalogue(self) -> list[str]:
-        """Effects that this rig can have: a rigid axis has none of transmission and link."""
-        rigid = "k0" not in self.nominal
-        return [
-            effect.identifier
-            for effect in fx.CATALOGUE
-            if effect.starts and (effect.on_rigid_axis or not rigid)
-        ]
+        self.scales = Scales.of_experiment(recorded, self.nominal)
 
     def refit(self) -> Fit:
         """Fit the base parameters alone, level after level added from the lowest amplitude up.
@@ -114,7 +109,7 @@ class Fitter:
         At a large amplitude a loop near its stability margin answers erratically to a parameter
         that is off; the low ones bring it near first.
         """
-        space = Space(self.nominal, (), (), self.tolerance)
+        space = Space(self.nominal, (), (), self.tolerance, self.scales)
         x = np.zeros(len(self.nominal))
         levels = sorted({self._levels[i] for i in self.train.which})
         for highest in levels[:-1]:
@@ -171,7 +166,7 @@ class Fitter:
         return Screening(
             parent.solution,
             parent.model,
-            starts(effect, self.peak_torque_nm, cycles),
+            starts(effect, self.scales, cycles, self.nominal),
             partial(self.space, parent),
             self.errors,
         )
@@ -179,17 +174,17 @@ class Fitter:
     def ripples(self, effect: str, parent: Fit) -> RippleSearch:
         """Return what ripples of an effect could do about the errors that a fit leaves."""
         return RippleSearch(
-            effect, self.recorded, self._simulator, self.train, parent.model, parent.solution
-        )
+            effect, self.recorded, self._simulator, self.train, parent.model, parent.solution,
+            self.scales.cycles(),
+        )  # fmt: skip
 
     def space(self, parent: Fit, seed: Mapping[str, float]) -> Space:
         """Return the space of a fit with the parameters of a seed free as well."""
-        added = space_for(self.nominal, seed)
-        return Space(
-            self.nominal,
-            parent.space.effects + added.effects,
-            parent.space.units + added.units,
-            self.tolerance,
+        added = space_for(self.nominal, seed, self.scales, self.tolerance)
+        return replace(
+            added,
+            effects=parent.space.effects + added.effects,
+            units=parent.space.units + added.units,
         )
 
     def errors(self, models: Sequence[Model]) -> np.ndarray:
@@ -248,7 +243,7 @@ class Fitter:
         cost, space, start = proposal
         if cost > parent.train_chi2:
             seed = dict.fromkeys(fx.EFFECTS[effect].names, 0.0)
-            seed.update(starts(effect, self.peak_torque_nm)[0])
+            seed.update(starts(effect, self.scales, nominal=self.nominal)[0])
             space = self.space(parent, seed)
             start = np.clip(space.point(parent.model), *space.bounds())
         fit = self.solve(names, space, start, most_steps=1, known=parent.solution.jacobian)

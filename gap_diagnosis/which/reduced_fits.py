@@ -11,7 +11,6 @@ from fjr_sim_node import effects as fx
 from ..model.simulated_rig import Model
 from .fits import MORE_STEPS, Fit, Fitter
 from .least_squares import Solution
-from .search_space import Space
 
 _ANY_SCALE = 1.0  # as a tolerance: base parameters within a factor of 16, k1 of 64
 
@@ -22,7 +21,7 @@ def without(fitter: Fitter, fit: Fit, effect: str) -> Fit:
     names = [n for n in fit.space.effects if not n.startswith(f"{effect}.")]
     chosen = [base + fit.space.effects.index(name) for name in names]
     units = tuple(fit.space.units[index - base] for index in chosen)
-    space = Space(fit.space.nominal, tuple(names), units, fit.space.tolerance)
+    space = replace(fit.space, effects=tuple(names), units=units)
     columns = [*range(base), *chosen]
     x = fit.solution.x[columns]
     errors = fitter.errors([space.model(x)])[0]

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controller_node.transfer_function import as_transfer_function, law_of
+from controller_node.law import as_transfer_function, law_of
 from fjr_records.recorded import RecordedExperiment
 from fjr_records.spectra import line_spectrum
 from fjr_sim_node import effects as fx
@@ -24,22 +24,20 @@ from ..model.misfit import Misfit
 from ..model.simulated_rig import Model, Simulator
 from .least_squares import Solution
 
-CYCLES = np.concatenate([np.arange(0.5, 4.0, 0.25), np.arange(4.0, 40.0, 0.5), np.arange(40, 231)])
-"""Numbers of ripples per turn that are looked at; between them the response hardly changes."""
-
 
 @dataclass(frozen=True)
 class _Motion:
     """One period of a model's motion, (realizations, N) each, and the loop's response to torque.
 
     Attributes:
-        motor, velocity, transmitted: rad, rad/s, N m.
+        motor, velocity, torque, transmitted: rad, rad/s, N m, N m.
         response: complex (realizations, lines), position per torque on the motor, rad/(N m).
         both: the same of a torque between link and motor.
     """
 
     motor: np.ndarray
     velocity: np.ndarray
+    torque: np.ndarray
     transmitted: np.ndarray
     response: np.ndarray
     both: np.ndarray
@@ -56,6 +54,7 @@ class RippleSearch:
         misfit: Misfit,
         model: Model,
         parent: Solution,
+        tried: np.ndarray,
     ) -> None:
         """Simulate the model's motion once.
 
@@ -66,8 +65,11 @@ class RippleSearch:
             misfit: of the realizations that count.
             model: the parent's model.
             parent: where the parent's fit ended.
+            tried: numbers of ripples per turn to look at, float64 (n,), ascending; between them
+                the response hardly changes.
         """
         self._effect, self._misfit, self._plant = effect, misfit, model.plant
+        self._tried = tried
         self._motion = _motion(recorded, simulator, misfit, model)
         self._basis = np.linalg.qr(parent.jacobian)[0]
         self._left = self._beyond(parent.residuals)
@@ -78,8 +80,8 @@ class RippleSearch:
         Args:
             most: how many to return, each a maximum of its own.
         """
-        gains = np.array([self._best_sizes((cycles,))[1] for cycles in CYCLES.tolist()])
-        return [float(CYCLES[i]) for i in _peaks(gains)[:most]]
+        gains = np.array([self._best_sizes((cycles,))[1] for cycles in self._tried.tolist()])
+        return [float(self._tried[i]) for i in _peaks(gains)[:most]]
 
     def harmonics(self, most: int) -> list[tuple[float, float, float, float, float]]:
         """Return the ripples with a second harmonic that promise most, best first.
@@ -88,14 +90,14 @@ class RippleSearch:
             (size, cycles per turn, phase (rad), second harmonic over the first, its phase (rad)),
             at the most `most`.
         """
-        tried = [self._best_sizes((cycles, 2.0 * cycles)) for cycles in CYCLES.tolist()]
+        tried = [self._best_sizes((cycles, 2.0 * cycles)) for cycles in self._tried.tolist()]
         found = []
         for i in _peaks(np.array([gain for _, gain in tried]))[:most]:
             weights = tried[i][0]
             first, second = complex(*weights[:2]), complex(*weights[2:])
             phase, size = cmath.phase(first), max(abs(first), 0.1 * abs(second))
             bend = math.remainder(cmath.phase(second) - 2.0 * phase, 2.0 * math.pi)
-            found.append((size, float(CYCLES[i]), phase, abs(second) / size, bend))
+            found.append((size, float(self._tried[i]), phase, abs(second) / size, bend))
         return found
 
     def _best_sizes(self, cycles: Sequence[float]) -> tuple[np.ndarray, float]:
@@ -121,21 +123,21 @@ def _motion(
     recorded: RecordedExperiment, simulator: Simulator, misfit: Misfit, model: Model
 ) -> _Motion:
     description = recorded.experiment
-    y, _, q = simulator.motion(model, misfit.which)
+    y, u, q = simulator.motion(model, misfit.which)
     lines = np.arange(recorded.lines)
     excited = np.array(description.excited_harmonics)
-    z = np.exp(2j * np.pi * lines / description.samples_per_period)
-    law = as_transfer_function(law_of(description.controller, description.sample_rate_hz))
-    powers = z[:, None] ** -np.arange(law.numerator.size)
-    controller = (powers @ law.numerator) / (powers @ law.denominator)
+    rate = description.sample_rate_hz
+    law = as_transfer_function(law_of(description.controller, rate))
+    forward, _ = law.response(lines * description.base_frequency_hz, rate)
     r = [recorded.realizations[i].played[-1] for i in misfit.which]
     loop = line_spectrum(y, lines.size) / (line_spectrum(np.array(r), lines.size) + 1e-300)
-    response = np.array([_between(lines, excited, row[excited]) for row in loop]) / controller
+    response = np.array([_between(lines, excited, row[excited]) for row in loop]) / forward
     p, s = model.plant, 2j * np.pi * lines * description.base_frequency_hz
     twist = q - y
     return _Motion(
         motor=y,
         velocity=np.gradient(y, axis=1) * description.sample_rate_hz,
+        torque=u,
         transmitted=p.get("k0", 0.0) * twist,
         response=response,
         both=response * _of_pair(p, s),
@@ -167,6 +169,8 @@ def _of_ripple(
     if acts_on == "motor":
         changes = line_spectrum(-turns * np.sign(motion.velocity), lines) * motion.response
     elif acts_on == "drive":
+        if not fx.EFFECTS[effect].full_parameters[0].unit:  # a share of the torque, not a torque
+            turns = turns * motion.torque
         changes = line_spectrum(turns, lines) * motion.response
     else:
         slopes = cycles * np.array([np.cos(angle), -np.sin(angle)])

@@ -16,7 +16,6 @@ from ..model.misfit import Misfit
 from ..outcome.verdict_words import ROUNDING
 from .attribution import CERTAIN, SMALL_GAIN, Attribution
 from .fits import Fit
-from .search_space import Space
 
 
 def widened(noise_std: np.ndarray, step: float, samples: int) -> np.ndarray:
@@ -49,8 +48,9 @@ def with_rounding(
     others = [replace(f, held_chi2=f.held_chi2 + more) for f in attribution.candidates]
     rest = [fit for fit in others if fit.effects != (ROUNDING,)]
     return Attribution(
-        replace(refit, train_chi2=train, held_chi2=held), (found, *rest), found, (), True
-    )
+        replace(refit, train_chi2=train, held_chi2=held), (found, *rest), found, (), True,
+        attribution.complete,
+    )  # fmt: skip
 
 
 def _rounded(refit: Fit, step: float) -> Fit:
@@ -61,7 +61,7 @@ def _rounded(refit: Fit, step: float) -> Fit:
         refit,
         effects=(ROUNDING,),
         model=refit.model.with_effects({name: step}),
-        space=Space(space.nominal, (name,), (step,), space.tolerance),
+        space=replace(space, effects=(name,), units=(step,)),
         solution=replace(
             solution,
             x=np.append(solution.x, 1.0),

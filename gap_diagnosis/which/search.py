@@ -8,6 +8,7 @@ on an amplitude that it has not seen.
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
@@ -24,14 +25,11 @@ from .attribution import (
     stands_out,
     tie_limit,
 )
+from .equivalents import SCALES, partners, stands_for
 from .estimates import sure
 from .fits import Fit, Fitter
 from .harmonics import with_second_harmonics
 from .reduced_fits import without, without_scale
-
-SCALES = tuple(effect.identifier for effect in fx.CATALOGUE if effect.scales)
-"""Effects that scale the base parameters: a gain of the torque does nothing else, and is no second
-cause whatever it gains; an eccentric encoder has a gain about its zero, and may do more."""
 
 _FINALISTS = 4
 _CLOSE = 2.0
@@ -48,25 +46,15 @@ _SCREENED = 2  # times as many are tried at several sizes as are fitted
 Progress = Callable[[str], None]
 
 
-def _partners(found: Sequence[str], among: set[str]) -> list[str]:
-    """Return the near equivalents of effects, so that a set is never short of one not tried."""
-    alike = {other for effect in found for other in fx.near_equivalents(effect)} | set(found)
-    return sorted(among & alike)
-
-
-def _stands_for(effects: Sequence[str], others: Sequence[str]) -> bool:
-    """Tell whether explanations differ by one effect and a near equivalent of it."""
-    mine, theirs = set(effects) - set(others), set(others) - set(effects)
-    return len(mine) == 1 and bool(_partners(sorted(theirs), mine))
-
-
 class Search:
     """The search over explanations of one experiment."""
 
-    def __init__(self, fitter: Fitter, progress: Progress = lambda _: None) -> None:
-        """Take the fitter of the experiment."""
-        self._fitter = fitter
-        self._progress = progress
+    def __init__(
+        self, fitter: Fitter, progress: Progress = lambda _: None, until: float = math.inf
+    ) -> None:
+        """Take the fitter, who is told what is tried, and when to stop adding (`time.monotonic`)."""
+        self._fitter, self._progress = fitter, progress
+        self._until, self._complete = until, True
         self._fits: dict[tuple[str, ...], Fit] = {}
         self._refit: Fit | None = None
         self._groups = fitter.train.groups()
@@ -107,15 +95,12 @@ class Search:
         if single and self._calls_for(refit, single[0], SMALL_GAIN):
             best = self._best(self._effects_needed(single[0])) or single[0]
         return Attribution(
-            refit, self._all_ranked(), best, self._tied(best), self._explains(refit, best)
-        )
+            refit, self._all_ranked(), best, self._tied(best), self._explains(refit, best),
+            self._complete,
+        )  # fmt: skip
 
     def _extend(
-        self,
-        parent: Fit,
-        effects: Sequence[str],
-        most: int | None = None,
-        near: float = _NEAR,
+        self, parent: Fit, effects: Sequence[str], most: int | None = None, near: float = _NEAR
     ) -> None:
         """Fit the parent with each effect more, in the order of what their starts achieve.
 
@@ -125,6 +110,8 @@ class Search:
             most: how many of them to pursue; None for all.
             near: how many times the best chi-square a converged fit may have to be left alone.
         """
+        if self._over:
+            return
         rivals = [fit.train_chi2 for fit in self._ranked(len(parent.effects) + 1)]
         least = min(parent.train_chi2, *rivals) if rivals else parent.train_chi2
         settled = self._settled(len(parent.effects) + 1, near)
@@ -135,10 +122,12 @@ class Search:
             hopeful = hopeful[: _SCREENED * most]
         proposals = {effect: screened[effect].proposals() for effect in hopeful}
         ordered = sorted(hopeful, key=lambda effect: proposals[effect][0][0])[:most]
-        for partner in _partners(ordered[:_PROMISING_PARTNERS], set(effects) - set(ordered)):
+        for partner in partners(ordered[:_PROMISING_PARTNERS], set(effects) - set(ordered)):
             proposals.setdefault(partner, screened[partner].proposals())
             ordered.append(partner)
         for number, effect in enumerate(ordered, 1):
+            if self._over:
+                break
             name = " + ".join((*parent.effects, effect))
             self._progress(f"{name} ({number} of {len(ordered)})")
             limit = _GIVE_UP * max(least, self._fitter.train.size)
@@ -149,6 +138,12 @@ class Search:
             if key not in self._fits or fit.train_chi2 < self._fits[key].train_chi2:
                 self._fits[key] = fit
             least = min(least, fit.train_chi2)
+
+    @property
+    def _over(self) -> bool:
+        """Whether the time is up; what is left untried is remembered."""
+        self._complete = self._complete and time.monotonic() <= self._until
+        return not self._complete
 
     def _enrich(self, count: int) -> None:
         """Give second harmonics to the ripples of the explanations that are near the best."""
@@ -183,8 +178,7 @@ class Search:
         return found
 
     def _all_ranked(self) -> tuple[Fit, ...]:
-        ordered = sorted(self._fits.values(), key=lambda fit: (not fit.converged, self.misfit(fit)))
-        return tuple(ordered)
+        return tuple(sorted(self._fits.values(), key=lambda f: (not f.converged, self.misfit(f))))
 
     def _calls_for(self, simple: Fit, rich: Fit, gain: float) -> bool:
         """Whether the richer explanation is worth its effect: a gain on held-out data.
@@ -208,7 +202,7 @@ class Search:
 
         A fit that was given up counts as well: it could only have become better.
         """
-        alike = {*best.effects, *_partners(best.effects, set(self._fitter.catalogue))}
+        alike = {*best.effects, *partners(best.effects, set(self._fitter.catalogue))}
         others = [
             fit
             for fit in self._fits.values()
@@ -266,9 +260,9 @@ class Search:
         if not pairs or not self._calls_for(best, pairs[0], SECOND_GAIN):
             return
         for kept, swapped in (pairs[0].effects, pairs[0].effects[::-1]):
-            partners = _partners([swapped], set(self._fitter.catalogue) - {kept, swapped})
-            if partners:
-                self._extend(without(self._fitter, pairs[0], swapped), partners, near=_ALIKE)
+            alike = partners([swapped], set(self._fitter.catalogue) - {kept, swapped})
+            if alike:
+                self._extend(without(self._fitter, pairs[0], swapped), alike, near=_ALIKE)
 
     def _settled(self, count: int, near: float) -> set[tuple[str, ...]]:
         """Return which explanations of `count` effects another start could not help."""
@@ -281,19 +275,20 @@ class Search:
         ranked = self._ranked(count)
         best = min((fit.train_chi2 for fit in ranked), default=math.inf)
         for effects, fit in list(self._fits.items()):
-            stands = ranked and _stands_for(effects, ranked[0].effects)
+            stands = ranked and stands_for(effects, ranked[0].effects)
             limit = _NEAR * best if stands else best
             if len(effects) == count and not fit.converged and fit.train_chi2 < limit:
                 self._progress(f"{' + '.join(effects)}, further")
                 self._fits[effects] = self._fitter.continued(fit)
 
     def _tied(self, best: Fit) -> tuple[Fit, ...]:
-        """Return the converged explanations of as many effects that do as well as the best."""
+        """Return the converged explanations of as many effects that do as well as the best.
+
+        One that only contains the best is no rival.
+        """
         if not best.effects:
             return ()
         limit = tie_limit(self.misfit(best), self._fitter.held.size)
-        return tuple(
-            fit
-            for fit in self._sure(len(best.effects))
-            if fit.effects != best.effects and self.misfit(fit) < limit
-        )
+        rivals = [fit for fit in self._sure(len(best.effects)) if self.misfit(fit) < limit]
+        own = best.effects
+        return tuple(f for f in rivals if f.effects != own and not fx.contains(f.effects, own))

@@ -1,16 +1,21 @@
-"""From which values an effect is fitted: several starting points each, and natural scales."""
+"""From which values an effect is fitted: several starting points each, and natural scales.
+
+The table of effects gives starts and bounds of fits relative to `Scales`, those of the record.
+"""
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from fjr_sim_node import effects as fx
 
 from ..model.simulated_rig import Model
+from .scales import Scales
 
 TOLERANCE = 0.1
 """How far a datasheet value may be off; fits look further, since a torque constant that is off
@@ -22,31 +27,67 @@ with the cube of the position."""
 
 _LEAST_LINK = 0.4  # of its inertia that a third mass leaves it at a start
 
+_COARSE_CYCLES = 11
+
+
+def possible_effects(nominal: Mapping[str, float]) -> list[str]:
+    """Return the effects that a rig with these nominal parameters can have and a fit can find."""
+    return [e.identifier for e in fx.CATALOGUE if e.starts and _free(e, nominal)]
+
+
+def _free(effect: fx.Effect, nominal: Mapping[str, float]) -> list[str]:
+    """Return the names that a fit of an effect may set; empty if the rig cannot have it.
+
+    A rigid axis has nothing of transmission and link but what its one body has; friction is added
+    only where the nominal has none.
+    """
+    rigid = "k0" not in nominal
+    if not (effect.on_rigid_axis if rigid else effect.on_flexible_axis):
+        return []
+    free = [
+        name
+        for name, p in zip(effect.names, effect.parameters, strict=True)
+        if not (rigid and p.of_link) and not (p.adds_to and nominal.get(p.adds_to))
+    ]
+    return free if set(free) & set(effect.size_names) else []
+
 
 def starts(
-    effect: str, peak_torque_nm: float, cycles: Sequence[float] | None = None
+    effect: str,
+    scales: Scales,
+    cycles: Sequence[float] | None = None,
+    nominal: Mapping[str, float] | None = None,
 ) -> list[dict[str, float]]:
-    """Return the starting points of an effect by full parameter name.
+    """Return the starting points of an effect by full parameter name, within the fit's bounds.
 
     Args:
         effect: identifier.
-        peak_torque_nm: greatest torque of the record; a drive that saturates does so below it,
-            and far below where the loop then asks for more.
+        scales: of the record.
         cycles: ripples per turn of an angle-periodic effect; None for a coarse grid.
+        nominal: bare parameters, which say what of the effect the rig can have; None for all.
     """
-    points = []
+    points: list[dict[str, float]] = []
     entry = fx.EFFECTS[effect]
-    limits = [p.name for p in entry.parameters if p.role == "limit"]
+    free = entry.names if nominal is None else _free(entry, nominal)
+    if cycles is None and entry.ripple:
+        tried = scales.cycles()
+        cycles = np.geomspace(tried[0], tried[-1], _COARSE_CYCLES).tolist()
     for start in entry.starts:
-        grid = dict(start)
-        for name in limits:
-            grid[name] = tuple(share * peak_torque_nm for share in grid[name])
-        if cycles is not None and "cycles_per_turn" in grid:
-            grid["cycles_per_turn"] = tuple(cycles)
-        for values in itertools.product(*grid.values()):
-            names = (f"{effect}.{name}" for name in grid)
-            points.append(dict(zip(names, values, strict=True)))
-    return points
+        grid: dict[str, tuple[float, ...]] = {}
+        for name, parameter in zip(entry.names, entry.parameters, strict=True):
+            if name not in free:
+                continue
+            if parameter.role == "cycles":
+                grid[name] = tuple(cycles or ())
+            elif parameter.name in start:
+                values = np.array(start[parameter.name]) * scales.of(name)
+                inside = np.clip(values, *scales.bounds(name))
+                grid[name] = tuple(dict.fromkeys(inside.tolist()))
+        points += [
+            dict(zip(grid, values, strict=True)) for values in itertools.product(*grid.values())
+        ]
+    shown = [p for p in points if any(p.get(name) for name in entry.size_names)]
+    return list({tuple(point.items()): point for point in shown}.values())
 
 
 def beside(model: Model, seed: Mapping[str, float]) -> Model:
@@ -72,12 +113,14 @@ class Space:
         effects: full names of the free effect parameters.
         units: scale of each, float64.
         tolerance: how far a nominal value may be off.
+        scales: of the record; None: effects have no bounds but their physical limits.
     """
 
     nominal: Mapping[str, float]
     effects: tuple[str, ...] = ()
     units: tuple[float, ...] = ()
     tolerance: float = TOLERANCE
+    scales: Scales | None = None
 
     def model(self, x: np.ndarray) -> Model:
         """Return the model at a point."""
@@ -87,10 +130,15 @@ class Space:
         }
         values = x[len(self.nominal) :] * np.array(self.units)
         effects = {
-            name: value if abs(value) >= fx.parameter(name).negligible else 0.0
-            for name, value in zip(self.effects, values.tolist(), strict=True)
+            name: value if abs(value) >= least else 0.0
+            for name, value, least in zip(self.effects, values.tolist(), self._least, strict=True)
         }
         return Model(base, effects)
+
+    @cached_property
+    def _least(self) -> list[float]:
+        """Sizes below which the effects count as off."""
+        return [self.scales.negligible(n) if self.scales else 0.0 for n in self.effects]
 
     def point(self, model: Model) -> np.ndarray:
         """Return the point of a model."""
@@ -110,28 +158,40 @@ class Space:
         far = [_SCALES.get(n, 2.0) * scale if v else 0.0 for n, v in self.nominal.items()]
         low, high = [-f for f in far], far
         for name, unit in zip(self.effects, self.units, strict=True):
-            least, most = fx.parameter(name).fit_bounds
+            parameter = fx.parameter(name)
+            least, most = (parameter.low, parameter.high)
+            if self.scales is not None:
+                least, most = self.scales.bounds(name)
             low.append(max(least / unit, -1e6))
             high.append(min(most / unit, 1e6))
         return np.array(low), np.array(high)
 
 
-def space_for(nominal: Mapping[str, float], start: Mapping[str, float]) -> Space:
+def space_for(
+    nominal: Mapping[str, float],
+    start: Mapping[str, float],
+    scales: Scales,
+    tolerance: float = TOLERANCE,
+) -> Space:
     """Return the space in which a start's effect parameters are free, in units of the start.
 
-    A parameter that starts at zero has the unit of the other sizes of its effect, or 1. A rigid
-    axis has no parameters of the link.
+    A parameter that starts at zero has the unit of its other starts. What the rig cannot have is
+    left out.
     """
-    if "k0" not in nominal:
-        start = {name: value for name, value in start.items() if not fx.parameter(name).of_link}
+    own = {name.split(".", 1)[0] for name in start}
+    free = {name for effect in own for name in _free(fx.EFFECTS[effect], nominal)}
+    start = {name: value for name, value in start.items() if name in free}
     units = []
     for name, value in start.items():
-        effect = fx.EFFECTS[name.split(".", 1)[0]]
         if fx.parameter(name).role == "angle":
             units.append(1.0)
-        elif value:
-            units.append(abs(value))
         else:
-            sizes = [abs(start[n]) for n in effect.size_names if start.get(n)]
-            units.append(max(sizes) if sizes else 1.0)
-    return Space(nominal, tuple(start), tuple(units))
+            units.append(abs(value) or _usual(name) * scales.of(name))
+    return Space(nominal, tuple(start), tuple(units), tolerance, scales)
+
+
+def _usual(name: str) -> float:
+    """Return the greatest relative start of a parameter by its full name, 1 if it has none."""
+    effect, _, own = name.partition(".")
+    given = [abs(v) for start in fx.EFFECTS[effect].starts for v in start.get(own, ())]
+    return max(given, default=0.0) or 1.0

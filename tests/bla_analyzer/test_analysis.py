@@ -19,7 +19,7 @@ from fjr_interface.experiment import Experiment
 from fjr_interface.topics import SIGNALS
 from fjr_kit.errors import InputError
 from fjr_records.discover import discover
-from fjr_records.experiment_folder import Override
+from fjr_records.experiment_bag import Override
 from fjr_records.lines import Grid
 from fjr_records.realization import read_realization
 
@@ -112,7 +112,7 @@ def test_robust_analysis_of_two_levels(tmp_path):
     assert (result.periods, result.transient_periods, result.described) == (3, 2, True)
     assert result.controller == {"kind": "gain", "p": loop.GAIN}
     assert result.notes == ()
-    assert len(result.checks) == 2 * 3 * 4
+    assert len(result.checks) == 2 * (3 * 4 + 1)
     assert all(check.passed for check in result.checks)
     for index, level in enumerate(result.levels):
         data = np.array([simulate(index, m) for m in range(3)]).reshape(3, 3, 5, N)[:, :, 2:]
@@ -233,7 +233,7 @@ def test_torque_stands_for_a_reference_that_is_not_read(tmp_path):
     level = result.levels[0]
     assert level.torque_rms_nm == pytest.approx(level.reference_rms_rad)
     assert level.torque_rms_nm == pytest.approx(np.std(expected[0]))
-    assert "the reference is constant" in refusal(tmp_path)
+    assert "the reference is constant" in refusal(tmp_path, method="robust")
 
 
 def test_soft_start_noise_and_a_rest_do_not_mislead_the_search():
@@ -332,31 +332,42 @@ def test_other_mismatches_between_bags_are_refused_by_name(tmp_path):
     assert "two has no experiment description but one has one" in refusal(tmp_path / "c")
 
 
-def test_the_same_phases_twice_are_refused_by_the_robust_method(tmp_path):
+def test_realizations_of_one_reference_are_pooled_as_periods_of_one(tmp_path):
+    """Described as repeats or not, they count once, and their periods together."""
     for m in range(3):
-        seed = 5 if m else 4
-        write(tmp_path / f"bag_{m}", describe(0, m), simulate(seed=seed))
-    assert "bag_1 and bag_2 play the same reference" in refusal(tmp_path)
-    assert analyze(tmp_path, method="fast").levels[0].bla is not None
+        write(tmp_path / f"bag_{m}", describe(0, m), simulate(seed=5 if m else 4))
+    result = analyze(tmp_path, method="robust")
+    assert result.levels[0].bla.realizations == 2
+    assert result.levels[0].bla.periods == describe().periods
+    assert "3 realizations play 2 different references" in " ".join(result.notes)
+
+
+def test_repeats_of_one_reference_alone_are_no_realizations(tmp_path):
+    for m in range(2):
+        repeat = {"repeat_of": 0} if m else {}
+        write(tmp_path / f"bag_{m}", describe(0, m, **repeat), simulate(seed=4))
+    assert "with different references and has one" in refusal(tmp_path, method="robust")
+    bla = analyze(tmp_path).levels[0].bla
+    assert (bla.method, bla.periods) == ("fast", 2 * describe().periods)
 
 
 def test_no_bag_and_no_folder_are_refused(tmp_path):
     assert str(tmp_path) in refusal(tmp_path)
     assert "nowhere" in refusal(tmp_path / "nowhere")
-    with pytest.raises(InputError, match="method must be robust or fast, not 'slow'"):
+    with pytest.raises(InputError, match="method must be robust, fast or local, not 'slow'"):
         analyze(tmp_path, method="slow")
 
 
 def test_one_realization_is_refused_by_the_robust_method_with_the_way_out(tmp_path):
     campaign(tmp_path, realizations=1)
-    assert "use the fast method" in refusal(tmp_path)
-    assert analyze(tmp_path, method="fast").levels[0].bla is not None
+    assert "leave the method out" in refusal(tmp_path, method="robust")
+    assert analyze(tmp_path).levels[0].bla.method == "fast"
 
 
 def test_a_level_with_one_realization_does_not_stop_the_others(tmp_path):
     campaign(tmp_path)
     write(tmp_path / "second", describe(1, 0), simulate(1, 0))
-    result = analyze(tmp_path)
+    result = analyze(tmp_path, method="robust")
     assert [level.bla is None for level in result.levels] == [False, True]
     assert any(note.startswith("level 1: the robust method needs two") for note in result.notes)
 

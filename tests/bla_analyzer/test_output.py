@@ -16,11 +16,11 @@ from synthetic_result import RATE, make_result, two_mass
 
 from bla_analyzer import load_result, to_frd
 from bla_analyzer.output import write_result
+from bla_analyzer.results.findings import findings
 from bla_analyzer.results.result import BlaEstimate, Comparison, LevelResult, LineLevels, Result
 from bla_analyzer.results.summary import (
     bla_phase_deg,
     decibel,
-    findings,
     level_name,
     mean_level_db,
     phase_deg,

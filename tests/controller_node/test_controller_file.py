@@ -10,8 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.signal import lfilter
 
-from controller_node import pd_filtered, transfer_function
-from controller_node.controller_file import TWO_DEGREES, describe, read_controller
+from controller_node import pd_filtered
+from controller_node.controller_file import describe, read_controller
+from controller_node.law import as_transfer_function, law_of
+from controller_node.structures import ONE_DEGREE, TWO_DEGREES
+from controller_node.transfer_function import TransferFunction
 from fjr_kit.errors import InputError
 
 RATE = 500.0
@@ -59,10 +62,10 @@ def test_the_law_of_the_node_is_kept_as_it_is(tmp_path):
     assert law == {"kind": "pd_filtered", "p": 200, "d": 60, "n": 24, "torque_limit_nm": 9.0}
     own = pd_filtered.from_description(law, RATE)
     same = described(tmp_path, "kind: pd\np: 200\nd: 60\nn: 24\ntorque_limit_nm: 9\n")
-    assert same["kind"] == transfer_function.KIND and same["torque_limit_nm"] == 9.0
-    expected = transfer_function.TransferFunction.of_pd(pd_filtered.coefficients(own))
-    found = transfer_function.law_of(same, RATE)
-    np.testing.assert_allclose(found.numerator, expected.numerator)
+    assert same["kind"] == ONE_DEGREE and same["torque_limit_nm"] == 9.0
+    expected = TransferFunction.of_pd(pd_filtered.coefficients(own))
+    found = law_of(same, RATE)
+    np.testing.assert_allclose(found.position, expected.position)
     np.testing.assert_allclose(found.denominator, expected.denominator)
 
 
@@ -87,13 +90,7 @@ def test_unknown_gains_stay_and_are_listed(tmp_path):
     }
     json.dumps(law, allow_nan=False)
     with pytest.raises(InputError, match=r"p is unknown, so the law cannot be simulated"):
-        transfer_function.law_of({"kind": "pid", "p": None, "unknown": ["p"]}, RATE)
-
-
-def test_two_degrees_of_freedom_are_said_not_to_be_simulated(tmp_path):
-    law = described(tmp_path, "kind: pd\np: 1\nd: 1\nderivative_on: measurement\n")
-    with pytest.raises(InputError, match="two degrees of freedom is described but not simulated"):
-        transfer_function.law_of(law, RATE)
+        law_of({"kind": "pid", "p": None, "unknown": ["p"]}, RATE)
 
 
 @pytest.mark.parametrize(
@@ -113,7 +110,7 @@ def test_two_degrees_of_freedom_are_said_not_to_be_simulated(tmp_path):
         ("\x00\xff", "neither YAML nor JSON"),
         (
             "kind: transfer_function\nnumerator: [1]\ndenominator: [1, -2]\n",
-            r"controller\.denominator has a pole of magnitude 2 outside",
+            r"controller has a pole of magnitude 2 outside",
         ),
         ("kind: transfer_function\nnumerator: [1]\ndenominator: [0, 1]\n", "is not causal"),
         (
@@ -121,6 +118,11 @@ def test_two_degrees_of_freedom_are_said_not_to_be_simulated(tmp_path):
             "domain: continuous\n",
             "is not causal",
         ),
+        (
+            "kind: transfer_function\nnumerator: [1]\ndenominator: [1, unknown]\n",
+            r"denominator\.1: must be a number; only coefficients of a numerator may be unknown",
+        ),
+        ("kind: pd\np: 1\nanti_windup: 2\n", "anti_windup: Extra inputs are not permitted"),
     ],
 )
 def test_a_bad_file_is_refused_in_a_sentence(tmp_path, text, says):
@@ -135,17 +137,39 @@ def test_a_file_that_is_not_there(tmp_path):
         read_controller(tmp_path / "none.yaml")
 
 
-@settings(max_examples=150)
-@given(st.text(max_size=200) | st.dictionaries(
+CONTENTS = st.dictionaries(
     st.sampled_from(["kind", "p", "i", "d", "n", "numerator", "denominator", "domain", "k_position",
-                     "k_velocity", "integral_time_s", "torque_limit_nm", "feed_forward"]),
-    st.sampled_from(["pd", "pid", "p_pi", "transfer_function", "unknown", "continuous", 0, 1e300,
-                     -1, [1, -0.5], [], [0], {}, {"velocity": 1e308}, None]),
-).map(json.dumps))  # fmt: skip
+                     "k_velocity", "integral_time_s", "torque_limit_nm", "feed_forward",
+                     "reference", "position"]),
+    st.sampled_from(["pd", "pid", "p_pi", "transfer_function", "two_degrees_of_freedom", "unknown",
+                     "pd_filtered", "continuous", 0, 1e300, -1, 2.5, [1, -0.5], [], [0], {}, None,
+                     {"velocity": 1e308}, {"numerator": [1, 2], "denominator": [1, -1]},
+                     {"numerator": [1e300], "denominator": [1e-300, 1e300]}]),
+)  # fmt: skip
+
+
+@settings(max_examples=200)
+@given(st.text(max_size=200) | CONTENTS.map(json.dumps))
 def test_whatever_the_file_holds_it_is_described_or_refused(tmp_path_factory, text):
     file = tmp_path_factory.getbasetemp() / "fuzzed.yaml"
     file.write_text(text, encoding="utf-8", errors="replace")
     try:
-        json.dumps(describe(read_controller(file), RATE, str(file)), allow_nan=False)
+        entry = describe(read_controller(file), RATE, str(file))
+        json.dumps(entry, allow_nan=False)
+        if "unknown" not in entry:
+            law_of(entry, RATE)
     except InputError as refused:
         assert "\n" not in str(refused)
+
+
+@settings(max_examples=300)
+@given(CONTENTS, st.sampled_from([None, "p", ["p"], ["p", "p"], ["numerator.0"], [3], ["q.1"]]))
+def test_whatever_a_bag_describes_it_is_a_law_or_refused(content, unknown):
+    content = content if unknown is None else {**content, "unknown": unknown}
+    for gains in (None, {"p": 3.0}, {"numerator.0": 2.0}):
+        try:
+            as_transfer_function(law_of(content, RATE, gains))
+        except InputError as refused:
+            sentence = str(refused)
+            assert sentence.startswith("experiment description: controller")
+            assert sentence.endswith(".") and "\n" not in sentence

@@ -10,7 +10,8 @@ import pytest
 from scipy.signal import lfilter
 
 from controller_node import pd_filtered, transfer_function
-from controller_node.transfer_function import TransferFunction, as_transfer_function, law_of
+from controller_node.law import as_transfer_function, law_of
+from controller_node.transfer_function import TransferFunction
 from fjr_kit.errors import InputError
 from fjr_records.recorded import RecordedExperiment
 from fjr_sim_node import effects, plant
@@ -28,10 +29,10 @@ LEAD_WITH_INTEGRATOR = {
 }
 
 
-def response(law: TransferFunction, error: np.ndarray) -> np.ndarray:
-    x, out = np.zeros(law.numerator.size), []
-    for e in error:
-        out.append(transfer_function.step(x, e, law.numerator, law.denominator, law.limit_nm))
+def response(law: TransferFunction, r: np.ndarray, y: np.ndarray) -> np.ndarray:
+    x, out = np.zeros(law.states + 1), []
+    for each in zip(r, y, strict=True):
+        out.append(transfer_function.step(x, *each, *law.coefficients))
     return np.array(out)
 
 
@@ -40,16 +41,16 @@ def response(law: TransferFunction, error: np.ndarray) -> np.ndarray:
     [([2.0], [1.0]), ([3.0, -1.0], [2.0, -1.0, 0.3]), ([0.0, 0.0, 1.0], [1.0, -0.5])],
 )
 def test_the_step_is_scipys_filter(b, a):
-    error = np.random.default_rng(1).standard_normal(200)
-    expected = lfilter(b, a, error)
-    assert np.allclose(response(TransferFunction.of(b, a), error), expected, atol=1e-13)
+    r, y = np.random.default_rng(1).standard_normal((2, 200))
+    expected = lfilter(b, a, r - y)
+    assert np.allclose(response(TransferFunction.of(b, a), r, y), expected, atol=1e-12)
 
 
 def test_the_torque_is_clamped_and_the_state_is_not():
-    error = np.random.default_rng(2).standard_normal(200)
-    free = lfilter([3.0, -1.0], [1.0, -0.9], error)
+    r, y = np.random.default_rng(2).standard_normal((2, 200))
+    free = lfilter([3.0, -1.0], [1.0, -0.9], r - y)
     law = TransferFunction.of([3.0, -1.0], [1.0, -0.9], 1.5)
-    assert np.allclose(response(law, error), np.clip(free, -1.5, 1.5), atol=1e-13)
+    assert np.allclose(response(law, r, y), np.clip(free, -1.5, 1.5), atol=1e-12)
     assert np.abs(free).max() > 1.5
 
 
@@ -94,13 +95,16 @@ def test_finer_substeps_change_a_smooth_motion_only_by_the_discretisation():
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"numerator": []}, "numerator must be a list of finite numbers"),
-        ({"numerator": None}, "numerator must be a list of finite numbers"),
-        ({"denominator": [1.0, "a"]}, "denominator must be a list of finite numbers"),
-        ({"denominator": [1.0, math.inf]}, "denominator must be a list of finite numbers"),
-        ({"denominator": [0.0, 1.0]}, "denominator begins with 0"),
+        ({"numerator": []}, "numerator: List should have at least 1 item"),
+        ({"numerator": None}, "numerator: it should be a valid list"),
+        ({"denominator": [1.0, "a"]}, "denominator.1: it should be a valid number"),
+        ({"denominator": [1.0, math.inf]}, "denominator.1: it should be a finite number"),
+        ({"denominator": [0.0, 1.0]}, "is not causal"),
         ({"denominator": [1.0, -2.5]}, "pole of magnitude 2.5 outside the unit circle"),
-        ({"torque_limit_nm": 0.0}, "torque_limit_nm must be greater than zero"),
+        ({"numerator": [1e308], "denominator": [1e-308]}, "coefficients that are not finite"),
+        ({"torque_limit_nm": 0.0}, "torque_limit_nm: it should be greater than 0"),
+        ({"kind": "fuzzy"}, "kind is 'fuzzy'; known are pd, pid, p_pi"),
+        ({"kind": ["pd"]}, "kind is"),
     ],
     ids=str,
 )

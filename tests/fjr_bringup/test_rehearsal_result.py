@@ -25,6 +25,7 @@ from fjr_bringup.rehearsal.report import render
 from fjr_bringup.rehearsal.result import Rehearsal
 from fjr_bringup.rehearsal.timing import RECORD, loop_timing
 from fjr_kit.check import Check
+from fjr_kit.document_tables import in_step
 
 TEXT = "<script>&'\""
 
@@ -178,6 +179,6 @@ def test_a_watched_machine_knows_niceness_load_and_what_has_ended():
 
 def test_the_document_lists_the_present_limits_and_faults():
     text = (DOCS / "rehearsal.md").read_text(encoding="utf-8")
-    assert tables.in_step(text) == text, (
+    assert in_step(text, tables.TABLES) == text, (
         "renew it: python -m fjr_bringup.rehearsal.tables docs/rehearsal.md"
     )

@@ -14,15 +14,21 @@ from fjr_bringup.replay.comparison import Difference
 from fjr_bringup.replay.publishing import Published, PublishedTopic
 from fjr_cli import analysis_summary, diagnosis_summary
 from fjr_cli.replay_summary import print_differences, print_published
+from gap_diagnosis.how_far.steps import steps
 from gap_diagnosis.outcome.diagnosis import (
     Candidate,
+    Cause,
     Diagnosis,
     Estimate,
+    EvidenceKind,
     Figure,
     Gap,
     GapFigures,
     Gaps,
+    Place,
+    Remainder,
     StageFigures,
+    Step,
 )
 
 WIDTHS = (40, 60, 80)
@@ -60,16 +66,18 @@ def test_diagnose_cuts_no_number_and_says_the_share_as_a_sentence(console):
     ranked = Candidate(
         effects=effects, held_out_chi2=123.4, delta=1.0, converged=True, parameters={}
     )
+    gap = Gaps(
+        nominal=Gap(nrmse_position=0.2345, nrmse_torque=0.3456, chi2_per_dof=2.91e4),
+        refit=Gap(nrmse_position=0.0567, nrmse_torque=0.0678, chi2_per_dof=1.91e3),
+        explained=Gap(nrmse_position=0.00123, nrmse_torque=0.000681, chi2_per_dof=0.662),
+        noise_floor=Gap(nrmse_position=0.00124, nrmse_torque=0.000696, chi2_per_dof=1.0),
+    )
     diagnosis = Diagnosis(
         verdict="ambiguous",
         effects=effects,
         confidence=0.5,
-        gap=Gaps(
-            nominal=Gap(nrmse_position=0.2345, nrmse_torque=0.3456, chi2_per_dof=2.91e4),
-            refit=Gap(nrmse_position=0.0567, nrmse_torque=0.0678, chi2_per_dof=1.91e3),
-            explained=Gap(nrmse_position=0.00123, nrmse_torque=0.000681, chi2_per_dof=0.662),
-            noise_floor=Gap(nrmse_position=0.00124, nrmse_torque=0.000696, chi2_per_dof=1.0),
-        ),
+        steps=steps(gap, effects),
+        gap=gap,
         gap_closed=0.987,
         gap_figures=GapFigures(position=stage, torque=stage, bla_sigma=stage, distortion_db=stage),
         ranking=[ranked],
@@ -84,6 +92,46 @@ def test_diagnose_cuts_no_number_and_says_the_share_as_a_sentence(console):
         assert name in text
     [share] = [line for line in text.splitlines() if "98.7%" in line]
     assert share.startswith("98.7% of what the refit left is")
+
+
+def test_diagnose_says_causes_remainder_and_evidence_of_records_whole(console):
+    place = Place(level=1, band_hz=(3.125, 15.625), lines="all", signal="position", sigma=4.42)
+    share = Figure(value=0.612, low=0.553, high=0.664)
+    diagnosis = Diagnosis(
+        verdict="partly_explained",
+        effects=["gravity"],
+        equivalent=[["gravity", "torque_bias"]],
+        confidence=0.97,
+        evidence=EvidenceKind(
+            noise="none", reported_on="blocks", controller="unknown", excitation="record"
+        ),
+        causes=[Cause(effect="gravity", others=["torque_bias"], present=0.97, share=share)],
+        steps=[
+            Step(added=None, stage="nominal", nrmse_position=1.42, nrmse_torque=None,
+                 chi2_per_dof=None),
+            Step(added=None, stage="refit", nrmse_position=0.481, nrmse_torque=0.3,
+                 chi2_per_dof=None),
+            Step(added="gravity", stage="cause", nrmse_position=0.193, nrmse_torque=0.2,
+                 chi2_per_dof=None),
+        ],
+        remainder=Remainder(
+            nrmse_position=0.193, share=0.161, looks_like=["velocity (a law of friction): 42%"],
+            where=[place],
+        ),
+        gap=Gaps(nominal=None, refit=None, explained=None, noise_floor=None),
+        parameters={"gravity.torque_nm": Estimate(value=8.058, low=7.914, high=8.202)},
+    )  # fmt: skip
+    diagnosis_summary.print_summary(diagnosis, console, Path("out"))
+    text = " ".join(printed(console).split())
+    assert text.startswith("Missing: gravity or torque bias; a remainder stays")
+    for said in (
+        "97%", "61% (55 to 66%)", "8.058", "7.914 to 8.202", "142", "48.1", "19.3",
+        "19% of the motion remains, 16% of the refit's squared gap.",
+        "velocity (a law of friction): 42%",
+        "level 1, 3.1 to 16 Hz (4.4 \N{GREEK SMALL LETTER SIGMA})",
+        "The noise is not known", "an observer held the model", "blocks of the records",
+    ):  # fmt: skip
+        assert said in text, said
 
 
 def test_replay_cuts_no_number(console):

@@ -67,6 +67,10 @@ def test_the_example_of_a_package_runs_as_written(package: str, beside_rig: None
     run_examples(importlib.import_module(package).__doc__ or "", package)
 
 
+def test_the_page_on_records_runs_as_written():
+    run_examples(PAGE.with_name("records.md").read_text(encoding="utf-8"), "records.md")
+
+
 @pytest.mark.slow
 def test_the_page_on_python_runs_as_written(beside_rig: None):
     run_examples(PAGE.read_text(encoding="utf-8").partition(WITH_CONTROL)[0], PAGE.name)

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from fjr_interface.bags.reader import audit, find_bags, read_record
 from fjr_interface.experiment import Experiment, RecordDescription
 from fjr_kit.errors import InputError
+from fjr_records.importers import coherence
 from fjr_records.importers.import_map import parse_map
 from fjr_records.importers.importer import import_files, read_files
 from fjr_records.importers.record_file import ImportOptions
@@ -116,6 +117,18 @@ def test_the_reference_of_another_run_is_refused(tmp_path, excitation):
     with pytest.raises(InputError, match=r"rig\.npz: .* is that of another run; map the right one"):
         read_files([file], options())
     read_files([save(tmp_path, "rig", values)], options())
+
+
+@pytest.mark.parametrize("size", [1e120, 1e-150])
+def test_whether_a_reference_is_of_another_run_does_not_depend_on_its_size(size):
+    signals = loop(noise_reference())
+    other = {**signals, "r": noise_reference(seed=1)}
+    assert coherence.unrelated(signals, None) is None
+    said = coherence.unrelated(other, None)
+    assert said is not None
+    for each, expected in ((signals, None), (other, said)):
+        sized = {symbol: values * size for symbol, values in each.items()}
+        assert coherence.unrelated(sized, None) == expected
 
 
 def test_repeats_are_told_from_new_realizations(tmp_path):

@@ -17,7 +17,7 @@ from fjr_interface.bags.reader import BagReader, SignalMap, find_bags, read_reco
 from fjr_interface.experiment import Experiment
 from fjr_interface.resampling.accuracy import Resampling
 from fjr_kit.errors import InputError
-from fjr_records.experiment_folder import Override
+from fjr_records.experiment_bag import Override
 from fjr_records.recorded import read_experiment
 
 MAP = [

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from effect_rig import MODERATE, named, relative_rms
+from effect_rig import MODERATE, axis, named, relative_rms
 from hypothesis import given
 from hypothesis import strategies as st
 from typer.testing import CliRunner
@@ -104,11 +104,13 @@ def test_fjr_simulate_rehearses_a_rig_with_backlash(tmp_path):
 
 
 def test_every_effect_reaches_a_realization_by_its_names():
-    bare = run_realization(SIMULATOR.defaults(), later := experiment())
+    later = experiment()
     for identifier, values in MODERATE.items():
+        rigid = axis(identifier)
+        bare = run_realization(SIMULATOR.check(rigid), later)
         if identifier == "torque_saturation":
             values = {"limit_nm": 5.0}
-        on = SIMULATOR.check(named(identifier, **values))
+        on = SIMULATOR.check(named(identifier, **values) | rigid)
         assert relative_rms(run_realization(on, later).torque, bare.torque) > 1e-5, identifier
 
 

@@ -26,9 +26,10 @@ from scipy.linalg import expm
 from scipy.optimize import brentq
 from scipy.special import ellipk
 
+from fjr_kit.document_tables import in_step
 from fjr_sim_node import effects, plant
 from fjr_sim_node.effects import document
-from fjr_sim_node.plant import torques
+from fjr_sim_node.plant import torques, transmission
 from fjr_sim_node.simulation import rig
 
 JM, J, FSM, FS, FVM, FV, K0, K1 = (
@@ -268,7 +269,7 @@ def test_drag_alone_slows_the_link_exponentially_over_its_way():
 
 def spring(d, **on):
     e = effects.coefficients({**named("torque_bias", torque_nm=1.0), **on})
-    return np.array([torques.spring_torque(float(x), plant.coefficients(PAPER), e) for x in d])
+    return np.array([transmission.spring_torque(float(x), plant.coefficients(PAPER), e) for x in d])
 
 
 TWISTS = np.linspace(-0.01, 0.01, 401)
@@ -370,9 +371,9 @@ def test_kinematic_error_follows_virtual_work():
 
     step = 1e-6
     for q, th in [(0.0, 0.0), (0.01, 0.05), (-0.02, 0.3)]:
-        te = torques.transmitted_torque(q, 0.0, th, 0.0, 0.0, p, e)
+        te = transmission.transmitted_torque(q, 0.0, th, 0.0, 0.0, p, e)
         on_link = torques.link_drive(q, 0.0, te, 0.0, 0.0, p, e)
-        on_motor = torques.motor_drive(th, te, 0.0, e)
+        on_motor = torques.motor_drive(th, 0.0, te, 0.0, p, e)
         assert on_link == pytest.approx((energy(q - step, th) - energy(q + step, th)) / 2 / step,
                                         rel=1e-6)  # fmt: skip
         assert on_motor == pytest.approx((energy(q, th - step) - energy(q, th + step)) / 2 / step,
@@ -440,6 +441,60 @@ def test_gravity_swings_the_free_link_with_the_pendulum_period():
     assert state[1] == pytest.approx(0.0, abs=1e-4)
 
 
+def test_gravity_swings_a_rigid_axis_as_one_pendulum():
+    on = named("gravity", torque_nm=3.0, angle_rad=0.5)
+    body = Rig({**FRICTIONLESS, "k0": math.inf}, on).start(th=1.0 - 0.5)
+    period = 4.0 * math.sqrt((J + JM) / 3.0) * ellipk(math.sin(0.5) ** 2)
+    before = body.energy()
+    state = body.hold(0.0, period, parts=2000)
+    assert state[2] == pytest.approx(0.5, rel=1e-6)
+    assert state[3] == pytest.approx(0.0, abs=1e-4)
+    assert body.energy() == pytest.approx(before, rel=1e-9)
+    assert not state[:2].any()
+
+
+def test_gravity_on_a_rigid_axis_is_cogging_of_one_cycle():
+    torque = 20.0 * np.random.default_rng(5).standard_normal(400)
+    gravity = Rig({"k0": math.inf}, named("gravity", torque_nm=4.0, angle_rad=0.7))
+    cogging = Rig({"k0": math.inf}, named("cogging", amplitude_nm=4.0, phase_rad=0.7 + math.pi))
+    assert np.allclose(gravity.play(torque), cogging.play(torque), rtol=1e-9, atol=1e-12)
+    assert np.ptp(gravity.play(torque)[:, 2]) > 1e-3
+
+
+def test_gravity_of_a_rigid_axis_is_held_by_its_friction_up_to_its_level():
+    for torque, sticks in ((10.9, True), (11.1, False)):
+        on = named("gravity", torque_nm=torque, angle_rad=0.5 * math.pi)
+        moved = Rig({"k0": math.inf}, on).hold(0.0, 0.1)[2]
+        assert (moved == 0.0) == sticks
+
+
+@pytest.mark.parametrize(("on", "bare"), [
+    (named("coulomb_friction", motor_nm=2.0, link_nm=1.5), {"fsm": 2.0, "fs": 1.5}),
+    (named("viscous_friction", motor_nm_s_rad=1.0, link_nm_s_rad=3.0), {"fvm": 1.0, "fv": 3.0}),
+], ids=["coulomb", "viscous"])  # fmt: skip
+def test_friction_that_the_datasheet_lacks_is_the_plant_with_that_friction(on, bare):
+    lacking = {name: 0.0 for name in bare}
+    torque = 30.0 * np.random.default_rng(5).standard_normal(300)
+    for axis in ({}, {"k0": math.inf}):
+        with_effect, with_value = Rig(lacking | axis, on), Rig(bare | axis)
+        assert np.array_equal(with_effect.play(torque), with_value.play(torque))
+        assert with_effect.energy() == with_value.energy()
+
+
+def test_a_transmission_that_yields_is_the_flexible_plant():
+    torque = 30.0 * np.random.default_rng(5).standard_normal(300)
+    on = named(
+        "transmission_stiffness",
+        compliance_rad_nm=1.0 / 1500.0, link_inertia_share=J / (J + JM),
+        link_coulomb_share=0.25, link_viscous_share=0.5,
+    )  # fmt: skip
+    rigid = {"k0": math.inf, "fs": 0.0, "fsm": 8.0, "fv": 0.0, "fvm": 4.0}
+    flexible = {"k1": 0.0, "fs": 2.0, "fsm": 6.0, "fv": 2.0, "fvm": 2.0}
+    assert np.allclose(Rig(rigid, on).play(torque), Rig(flexible).play(torque), rtol=1e-7,
+                       atol=1e-12)  # fmt: skip
+    assert np.array_equal(Rig(flexible, on).play(torque), Rig(flexible).play(torque))
+
+
 def test_gravity_rests_where_the_spring_holds_it():
     on = named("gravity", torque_nm=30.0, angle_rad=0.5)
     state = Rig({"fs": 0.0, "fv": 20.0, "k1": 0.0, **MOTOR_HELD}, on).hold(0.0, 3.0, parts=300)
@@ -475,6 +530,18 @@ def test_delay_of_whole_samples_is_the_shifted_torque(samples, rate):
     shifted = np.concatenate([np.zeros(samples), TORQUE[:-samples]])
     exact = Rig({}, named("load_friction", coefficient=1e-300)).play(shifted, 1.0 / rate)
     assert np.array_equal(delayed, exact)
+
+
+def test_a_delay_of_a_tenth_of_a_second_is_remembered_at_the_highest_rate():
+    steps = np.where(np.arange(2100) < 50, 30.0, 0.0)
+    late = Rig({}, named("delay", time_s=0.1)).play(steps, 1.0 / 20_000.0)
+    assert not late[:2000, 2].any() and late[2001:, 2].all()
+    now = Rig({}, named("load_friction", coefficient=1e-300)).play(steps[:100], 1.0 / 20_000.0)
+    assert np.array_equal(late[2000:, 2], now[:, 2])
+
+
+def test_a_delay_beyond_what_is_remembered_is_no_motion():
+    assert np.isnan(Rig({}, named("delay", time_s=0.1)).hold(30.0, 5e-6)[2])
 
 
 @pytest.mark.parametrize("fifths", [1, 2, 8])
@@ -568,7 +635,7 @@ DOCUMENT = DOCS / "effects.md"
 
 def test_the_document_is_in_step_with_the_catalogue():
     text = DOCUMENT.read_text(encoding="utf-8")
-    assert document.in_step(text) == text, (
+    assert in_step(text, document.TABLES) == text, (
         "renew it: python -m fjr_sim_node.effects.document docs/effects.md"
     )
     for name in effects.NAMES:

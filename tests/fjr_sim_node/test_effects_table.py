@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import inspect
+import math
 import os
 import shutil
 import subprocess
@@ -14,6 +15,7 @@ import pytest
 from paths import ROOT
 
 from fjr_sim_node import effects as fx
+from fjr_sim_node.plant import PLANT, with_added
 
 PACKAGES = [path.parent.name for path in ROOT.glob("*/__init__.py")]
 
@@ -27,6 +29,7 @@ def test_the_law_of_an_effect_is_where_its_entry_says(effect: fx.Effect) -> None
 def test_every_parameter_is_read_by_a_kernel() -> None:
     kernels = [
         "plant.torques",
+        "plant.transmission",
         "plant.presliding",
         "plant.motion",
         "plant.stick_slip",
@@ -36,8 +39,21 @@ def test_every_parameter_is_read_by_a_kernel() -> None:
     sources = "".join(
         inspect.getsource(importlib.import_module(f"fjr_sim_node.{name}")) for name in kernels
     )
-    for name in fx.NAMES:
-        assert f"fx.{name.upper().replace('.', '_')}" in sources
+    for effect in fx.CATALOGUE:
+        for name in () if effect.of_bare_plant else effect.names:
+            assert f"fx.{name.upper().replace('.', '_')}" in sources
+
+
+def test_effects_of_the_bare_plant_change_its_parameters_and_need_no_kernel() -> None:
+    found = [effect for effect in fx.CATALOGUE if effect.of_bare_plant]
+    assert len(found) == 3
+    for effect in found:
+        values = PLANT.defaults() | {"k0": math.inf if effect.axis == "rigid" else 1500.0}
+        sizes = dict.fromkeys(effect.names, 0.5)
+        assert fx.coefficients(sizes) is None
+        for name in effect.names:
+            one = with_added(values | sizes | {name: 0.25})
+            assert one != with_added(values | sizes), name
 
 
 def test_starts_name_parameters_of_their_effect_within_their_bounds() -> None:
@@ -45,8 +61,19 @@ def test_starts_name_parameters_of_their_effect_within_their_bounds() -> None:
         known = {p.name: p for p in effect.parameters}
         for start in effect.starts:
             for name, values in start.items():
-                low, high = known[name].fit_bounds
+                low, high = known[name].fit or (known[name].low, known[name].high)
+                if known[name].fit is None and known[name].unit:
+                    high = math.inf  # a physical limit, not relative as the starts are
                 assert all(low <= value <= high for value in values), (effect.identifier, name)
+
+
+def test_what_an_effect_contains_is_another_effect_of_the_table() -> None:
+    for effect in fx.CATALOGUE:
+        assert set(effect.contains) <= set(fx.EFFECTS) - {effect.identifier}
+    assert fx.contains(("directional_loss",), ("load_friction",))
+    assert fx.contains(("delay", "directional_loss"), ("load_friction", "delay"))
+    assert not fx.contains(("load_friction",), ("directional_loss",))
+    assert not fx.contains(("delay", "directional_loss"), ("load_friction",))
 
 
 def test_near_equivalents_are_mutual_and_never_the_effect_itself() -> None:

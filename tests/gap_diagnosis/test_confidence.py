@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from gap_diagnosis.outcome.diagnosis import Candidate, Diagnosis, Gap, Gaps
+from gap_diagnosis.outcome.diagnosis import Candidate, Diagnosis, EvidenceKind, Gap, Gaps
 from gap_diagnosis.outcome.verdict_words import ON, meaning
 from gap_diagnosis.which.confidence import (
     COEFFICIENTS,
@@ -37,6 +37,9 @@ def said(verdict, left=1.0, second=50.0, effects=(), refit=100.0):
     )  # fmt: skip
 
 
+NOTHING_HELD_OUT = EvidenceKind(
+    noise="repeats", reported_on="none", controller="known", excitation="periodic"
+)
 VERDICTS = [
     said("effect", effects=("backlash",)), said("ambiguous", effects=("backlash", "gravity")),
     said("no_gap", refit=1.0), said("parameters_only", refit=1.0), said("unexplained", 30.0, 30.0),
@@ -53,7 +56,7 @@ def test_every_verdict_has_a_confidence_between_half_and_one(diagnosis):
 
 @pytest.mark.parametrize("diagnosis", VERDICTS, ids=lambda d: d.verdict)
 def test_where_nothing_was_held_out_no_fit_is_more_likely_right_than_not(diagnosis):
-    untested = diagnosis.model_copy(update={"reported_on": "none"})
+    untested = diagnosis.model_copy(update={"evidence": NOTHING_HELD_OUT})
     if group(diagnosis) == "gate":  # rests on no fit
         assert confidence(untested) == confidence(diagnosis)
     else:

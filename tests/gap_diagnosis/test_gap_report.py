@@ -21,13 +21,22 @@ from fjr_sim_node.plant import PLANT
 from gap_diagnosis.gates.gate_checks import check_gates
 from gap_diagnosis.how_far.comparison import bla_distance_db, compare
 from gap_diagnosis.how_far.held_out_gap import held_out_gap
+from gap_diagnosis.how_far.steps import steps
 from gap_diagnosis.investigation import Investigation, investigate
 from gap_diagnosis.model.misfit import Misfit
 from gap_diagnosis.model.simulated_rig import Model, Simulator
-from gap_diagnosis.outcome.diagnosis import Diagnosis, Estimate, NextExperiment
+from gap_diagnosis.outcome.diagnosis import (
+    Cause,
+    Diagnosis,
+    Estimate,
+    EvidenceKind,
+    NextExperiment,
+)
 from gap_diagnosis.outcome.verdict_words import WORDS
-from gap_diagnosis.report.gap_output import updated_values, write_diagnosis
+from gap_diagnosis.report.gap_output import write_diagnosis
 from gap_diagnosis.report.gap_report import render_gap_report
+from gap_diagnosis.report.updated_parameters import updated_values
+from gap_diagnosis.report.waterfall import bars
 from gap_diagnosis.where.residual_map import residual_map
 from gap_diagnosis.which.attribution import Attribution
 from gap_diagnosis.which.fits import Fit
@@ -70,6 +79,11 @@ def found() -> Investigation:
         effects=["backlash"],
         equivalent=[["backlash", "piecewise_stiffness"]],
         confidence=0.9,
+        evidence=EvidenceKind(
+            noise="repeats", reported_on="records", controller="known", excitation="periodic"
+        ),
+        causes=[Cause(effect="backlash", others=["piecewise_stiffness"], present=0.9)],
+        steps=steps(gaps, ["backlash"]),
         gap=gaps,
         gap_closed=0.98,
         gap_figures=figures,
@@ -120,6 +134,32 @@ def test_the_held_out_gap_is_told_once_with_misfit_and_intervals(page, found):
     told = f"{100.0 * refit.value:.3g} [{100.0 * refit.low:.3g}, {100.0 * refit.high:.3g}]"
     assert text.count(told) == 1
     assert "misfit per degree of freedom 345.6 100 1.02 1" in text
+
+
+def test_the_waterfall_goes_from_the_nominal_to_the_noise_and_each_bar_begins_where_one_ended(
+    page, found
+):
+    gap = found.diagnosis.gap
+    stages = (gap.nominal, gap.refit, gap.explained)
+    nominal, refit, best = (100.0 * stage.nrmse_position for stage in stages)
+    assert [(b.name, b.kind, b.start, b.end) for b in bars(found.diagnosis)] == [
+        ("nominal", "whole", 0.0, nominal),
+        ("refit", "less", nominal, refit),
+        ("+ backlash", "less", refit, best),
+        ("remainder", "left", 0.0, best),
+        ("noise", "noise", 0.0, 100.0 * gap.noise_floor.nrmse_position),
+    ]
+    plot = page.data()["overview"]["waterfall"]
+    closed = next(trace for trace in plot["data"] if trace["name"] == "closed")
+    assert np.allclose(closed["base"], [refit, best], rtol=1e-5)
+    assert np.allclose(np.add(closed["base"], closed["x"]), [nominal, refit], rtol=1e-4)
+    assert plot["layout"]["xaxis"]["type"] == "log"  # the nominal is far above the noise
+
+
+def test_causes_and_evidence_are_said(page):
+    text = " ".join(" ".join(page.texts).split())
+    assert "backlash or piecewise stiffness 90%" in text
+    assert "Steady periods were compared. The controller is known" in text
 
 
 def test_the_page_asks_nothing_of_any_network(found):
@@ -179,7 +219,9 @@ def test_the_folder_holds_all_that_was_promised_and_earlier_files_go(found, tmp_
     assert Diagnosis.read(out / "diagnosis.json") == found.diagnosis
     assert not (out / "figures" / "old.png").exists() and (out / "mine.txt").read_text() == "old"
     stems = {path.stem for path in (out / "figures").iterdir()}
-    assert stems == {"where_position", "where_torque", "sigma_refit", "residual_torque"}
+    assert stems == {
+        "waterfall", "where_position", "where_torque", "sigma_refit", "residual_torque",
+    }  # fmt: skip
     for stem in stems:
         assert (out / "figures" / f"{stem}.pdf").stat().st_size > 1000
     assert not list(tmp_path.glob(".*")) and not list(out.glob(".*"))
@@ -188,11 +230,11 @@ def test_the_folder_holds_all_that_was_promised_and_earlier_files_go(found, tmp_
 def test_diagnosis_json_has_the_fields_of_its_schema_and_no_other(found):
     text = json.loads(found.diagnosis.to_json())
     assert list(text) == [
-        "schema", "verdict", "effects", "equivalent", "confidence", "reported_on", "gap",
-        "gap_closed", "gap_figures", "bags", "where",
+        "schema", "verdict", "effects", "equivalent", "confidence", "evidence", "causes", "steps",
+        "remainder", "gap", "gap_closed", "gap_figures", "bags", "where",
         "ranking", "parameters", "next_experiment", "notes",
     ]  # fmt: skip
-    assert text["schema"] == "fjr_rig/diagnosis/1"
+    assert text["schema"] == "fjr_rig/diagnosis/2"
     assert set(text["gap"]) == {"nominal", "refit", "explained", "noise_floor"}
     assert set(text["where"][0]) == {"level", "band_hz", "lines", "signal", "sigma"}
 
@@ -207,7 +249,7 @@ def test_the_updated_file_is_a_campaign_of_the_better_simulation(found, tmp_path
     out = tmp_path / "out"
     write_diagnosis(found, out)
     campaign = Campaign.create(out / "updated.yaml")
-    values = updated_values(found)
+    values = updated_values(found.recorded, found.diagnosis)
     simulator = campaign.values["simulator"]
     for name, estimate in found.diagnosis.parameters.items():
         assert simulator[name] == estimate.value

@@ -10,18 +10,21 @@ from gap_cases import simulate_case, write_bags
 
 from fjr_interface.bags.reader import SignalMap
 from fjr_records.recorded import read_experiment
-from fjr_sim_node import effects
+from fjr_sim_node import effects, plant
 from fjr_sim_node.plant import PLANT
+from fjr_sim_node.simulation.simulator import SIMULATOR
 from fjr_sim_node.theory import linear
 from gap_diagnosis.gates.bags_gate import bags_gate
 from gap_diagnosis.gates.gate_checks import check_gates
 from gap_diagnosis.model.misfit import Misfit
 from gap_diagnosis.model.prediction import crossover_hz, lead, observer
 from gap_diagnosis.model.simulated_rig import Model, Simulator
+from gap_diagnosis.report.updated_parameters import simulator_values
+from gap_diagnosis.which.catalogue import catalogue
 from gap_diagnosis.which.fits import Fitter
 from gap_diagnosis.which.least_squares import solve
 from gap_diagnosis.which.search import Search
-from gap_diagnosis.which.search_space import Space
+from gap_diagnosis.which.search_space import Scales, Space, starts
 
 NOMINAL = PLANT.defaults()
 LEAD_WITH_INTEGRATOR = {
@@ -32,6 +35,7 @@ LEAD_WITH_INTEGRATOR = {
 }
 RIGID = {"k0": math.inf, "k1": 0.0}
 SMALL = {"levels_rad": (3e-3, 1e-2)}
+ANY_SCALES = Scales(100.0, 5.0, 0.05, 0.05, 1e-3, 50.0, 0.5, 300.0)
 
 
 def search(recorded, nominal, *names):
@@ -169,6 +173,7 @@ def test_a_rigid_axis_is_one_body():
         {"presliding_friction.motor_rad": 1e-3},
         {"quadratic_friction.motor_nm_s2_rad2": 1.0},
         {"delay.time_s": 5e-4},
+        {"gravity.torque_nm": 12.0, "gravity.angle_rad": 1.0},
     ],
     ids=lambda effect: next(iter(effect)),
 )
@@ -192,12 +197,57 @@ def test_effects_of_transmission_and_link_are_not_looked_for_on_a_rigid_axis():
     fitted = {effect.identifier for effect in effects.CATALOGUE if effect.starts}
     assert fitted - set(fitter.catalogue) == {
         "stribeck_friction_link", "load_friction", "backlash", "piecewise_stiffness", "hysteresis",
-        "transmission_damping", "kinematic_error", "extra_mode", "gravity",
+        "transmission_damping", "kinematic_error", "extra_mode",
+        "coulomb_friction", "viscous_friction", "directional_loss", "asymmetric_stiffness",
     }  # fmt: skip
     refit = fitter.refit()
     assert set(refit.model.plant) == {"jm", "fsm", "fvm"}
     assert refit.held_chi2 / fitter.held.size < 1.3
     assert bags_gate(case.recorded, levels, simulator, refit.model).passed
+
+
+@pytest.mark.parametrize("axis", [{}, RIGID], ids=["flexible", "rigid"])
+@pytest.mark.parametrize(("kind", "motor", "link"), [
+    ("coulomb_friction", "fsm", "fs"), ("viscous_friction", "fvm", "fv"),
+])  # fmt: skip
+def test_friction_that_the_nominal_lacks_is_a_cause(axis, kind, motor, link):
+    """The rig has the friction, its datasheet says zero."""
+    case = simulate_case({}, seed=7, plant=axis, **SMALL)
+    nominal = {**NOMINAL, **axis, motor: 0.0, link: 0.0}
+    found, fitter = search(case.recorded, nominal, kind, "torque_bias", "quadratic_friction")
+    assert found.best.effects == (kind,)
+    assert found.best.held_chi2 / fitter.held.size < 1.5
+    fitted = {**found.best.model.plant, **found.best.model.effects}
+    own = simulator_values(fitted)
+    total = own[motor] + own[link]
+    assert total == pytest.approx(case.rig[motor] + case.rig[link], rel=0.05)
+    assert not set(own) & set(effects.EFFECTS[kind].names)
+
+
+def test_one_side_that_has_friction_is_not_offered_it_again():
+    assert "coulomb_friction" not in catalogue(NOMINAL)
+    points = starts("coulomb_friction", ANY_SCALES, nominal={**NOMINAL, "fs": 0.0})
+    assert points and all(set(point) == {"coulomb_friction.link_nm"} for point in points)
+    assert "transmission_stiffness" not in catalogue(NOMINAL)
+    assert "transmission_stiffness" in catalogue({"jm": 0.5, "fsm": 1.0, "fvm": 1.0})
+
+
+def test_a_transmission_that_yields_is_found_where_the_nominal_is_rigid():
+    case = simulate_case({}, seed=7, plant={"k1": 0.0}, **SMALL)
+    nominal = {**NOMINAL, **RIGID}
+    found, fitter = search(case.recorded, nominal, "transmission_stiffness", "delay", "torque_bias")
+    assert found.best.effects == ("transmission_stiffness",)
+    assert found.best.held_chi2 / fitter.held.size < 1.5
+    own = simulator_values({**found.best.model.plant, **found.best.model.effects})
+    for name in ("jm", "j", "k0"):
+        assert own[name] == pytest.approx(case.rig[name], rel=0.05), name
+
+
+def test_the_updated_simulation_of_a_rigid_axis_is_rigid():
+    own = simulator_values({"jm": 0.5, "fsm": 2.0, "fvm": 1.0, "gravity.torque_nm": 3.0})
+    assert own["k0"] == math.inf and own["gravity.torque_nm"] == 3.0
+    sums = plant.rigid_sums(SIMULATOR.check(own))
+    assert sums == pytest.approx({"jm": 0.5, "fsm": 2.0, "fvm": 1.0}, rel=1e-5)
 
 
 def with_link_noise(recorded, std_rad=2e-5):

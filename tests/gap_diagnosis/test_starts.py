@@ -106,7 +106,7 @@ def test_an_eccentric_encoder_is_found_though_it_scales_the_parameters_by_a_fift
 @pytest.mark.parametrize(("share", "knee"), [(1.15, 0.3), (1.0, 0.1), (0.6, 0.2)])
 def test_a_drive_limit_is_found_even_if_only_its_knee_is_reached(share, knee):
     bare = fitter_of(simulate_case(seed=4, **SHORT))[2]
-    limit = share * bare.peak_torque_nm
+    limit = share * bare.scales.peak_torque_nm
     truth = {"torque_saturation.limit_nm": limit, "torque_saturation.knee": knee}
     fitter = fitter_of(simulate_case(truth, seed=4, **SHORT))[2]
     refit, effect = fitter.refit(), "torque_saturation"

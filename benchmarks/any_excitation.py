@@ -1,0 +1,140 @@
+"""The BLA from any excitation on random rigs: do 95 % discs hold the truth, and do signals agree?
+
+Run `python benchmarks/any_excitation.py` (--quick: fewer rigs). Each case is one record of
+30 s of a rig of its own, under noise, a chirp or a multisine of equal flat power, analysed by
+itself. Truth of a linear rig: its sampled response. Truth of a rig with friction and a hardening
+transmission: the pooled response of 40 multisines of that power; beside it the statistical
+linearisation. A trapezoid shows which lines it excites.
+"""
+
+from __future__ import annotations
+
+import sys
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+
+import numpy as np
+from machine import describe
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+import rig_records as rigs
+
+from bla_analyzer.bla.arbitrary import ORDER, arbitrary_bla, run_of
+from bla_analyzer.bla.local_fit import Run, fit_window
+from fjr_kit.errors import InputError
+from fjr_sim_node.theory.statistical_linearisation import linearise
+
+KINDS = ("noise", "chirp", "multisine")
+CASES = ((True, 30.0, 0.03), (True, 30.0, 1e-3), (False, 30.0, 1e-3), (False, 30.0, 0.01))
+"""(linear, seconds, encoder noise over rms of the reference)."""
+TRUTH_RUNS = 40
+EVERY = 4
+"""Every how many lines the truth is looked at."""
+Row = tuple[int, int, int, float, float]
+"""Lines held, reliable lines, lines left out, median radius over |G|, median error in dB."""
+
+
+def many_runs(rig: rigs.Rig, seconds: float) -> list[Run]:
+    """Return the multisines behind the truth of a rig that is not linear."""
+    return [
+        run_of([rigs.record(rig, "multisine", seconds, noise=0.0, seed=10_000 + m)], rigs.RATE)
+        for m in range(0 if rig.linear else TRUTH_RUNS)
+    ]
+
+
+def truth_of(
+    rig: rigs.Rig, runs: list[Run], seconds: float, frequency_hz: np.ndarray
+) -> np.ndarray:
+    """Return the BLA of a rig for multisines, complex (F,), rad/(N m)."""
+    if rig.linear:
+        return rigs.truth(rig, frequency_hz)
+    half = np.maximum(9.0 / seconds, 0.02 * frequency_hz)
+    fits = [
+        fit_window(runs, at, (max(at - h, 1.0 / seconds), at + h), ORDER)
+        for at, h in zip(frequency_hz, half, strict=True)
+    ]
+    return np.array([np.nan if fit is None else fit.g for fit in fits])
+
+
+def linearised(rig: rigs.Rig, seconds: float, frequency_hz: np.ndarray) -> np.ndarray:
+    """Return the BLA that statistical linearisation predicts, complex (F,)."""
+    low, high = rigs.BAND_HZ
+    lines = np.arange(np.ceil(low * seconds), high * seconds + 1) / seconds
+    amplitude = np.full(lines.size, rigs.RMS_RAD[rig.linear] * np.sqrt(2.0 / lines.size))
+    try:
+        found = linearise(rig.values, rig.controller, rigs.RATE, lines, amplitude)
+    except InputError:
+        return np.full(frequency_hz.size, complex(np.nan))
+    return found.frf(frequency_hz)
+
+
+def judged(seed: int, linear: bool, seconds: float, noise: float) -> dict[str, Row]:
+    """Return a row for each kind of excitation, and for statistical linearisation."""
+    rig = rigs.random_rig(seed, linear=linear)
+    rows: dict[str, Row] = {}
+    many = many_runs(rig, seconds)
+    for kind in KINDS:
+        record = rigs.record(rig, kind, seconds, noise=noise, seed=seed)
+        found = arbitrary_bla([run_of([record], rigs.RATE)], rigs.RATE)
+        bla = found.bla
+        keep = np.flatnonzero(bla.reliable)[::EVERY]
+        f, g, radius = bla.frequency_hz[keep], bla.g[keep], bla.radius_95[keep]
+        exact = truth_of(rig, many, seconds, f)
+        error = np.abs(20.0 * np.log10(np.abs(g / exact)))
+        held = int((np.abs(g - exact) <= radius).sum())
+        lost = int((found.left_out_hz < rigs.BAND_HZ[1]).sum())
+        rows[kind] = (
+            held,
+            keep.size,
+            lost,
+            float(np.median(radius / np.abs(g))),
+            float(np.median(error)),
+        )
+        if kind == "multisine" and not linear:
+            off = np.abs(20.0 * np.log10(np.abs(linearised(rig, seconds, f) / exact)))
+            rows["statistical linearisation"] = (0, keep.size, 0, np.nan, float(np.median(off)))
+    return rows
+
+
+def trapezoid(seed: int) -> tuple[float, float, int, int, int]:
+    """Return first and last frequency found, lines found and left out, and lines held."""
+    rig = rigs.random_rig(seed, linear=True)
+    record = rigs.record(rig, "trapezoid", 60.0, noise=0.01, seed=seed)
+    found = arbitrary_bla([run_of([record], rigs.RATE)], rigs.RATE)
+    f = found.bla.frequency_hz
+    held = np.abs(found.bla.g - rigs.truth(rig, f)) <= found.bla.radius_95
+    return f[0], f[-1], f.size, found.left_out_hz.size, int(held.sum())
+
+
+def main() -> None:
+    """Measure and print."""
+    print(describe() + "\n", flush=True)
+    rig_count = 8 if "--quick" in sys.argv else 20
+    head = f"{'rig':8}{'s':>5}{'noise':>8}  {'excitation':26}{'discs hold':>11}{'lines':>7}"
+    print(head + f"{'left out':>10}{'radius':>9}{'error':>9}")
+    with ProcessPoolExecutor(2) as pool:
+        for linear, seconds, noise in CASES:
+            jobs = [pool.submit(judged, s, linear, seconds, noise) for s in range(rig_count)]
+            found = [job.result() for job in jobs]
+            for kind in found[0]:
+                rows = np.array([one[kind] for one in found])
+                held, lines, lost = rows[:, :3].sum(axis=0)
+                cover = f"{held / lines:.1%}" if kind in KINDS else ""
+                radius = f"{np.median(rows[:, 3]):.2%}" if kind in KINDS else ""
+                name = "linear" if linear else "friction"
+                print(
+                    f"{name:8}{seconds:5.0f}{noise:8g}  {kind:26}{cover:>11}{lines:7.0f}"
+                    f"{lost:10.0f}{radius:>9}{np.nanmedian(rows[:, 4]):6.2f} dB",
+                    flush=True,
+                )
+        found = list(pool.map(trapezoid, range(rig_count)))
+    first, last, lines, lost, held = np.array(found).T
+    print(
+        f"\ntrapezoid, {rig_count} linear rigs: {np.median(first):.2f} to {np.median(last):.1f} Hz "
+        f"(medians), {lines.sum():.0f} lines found, {lost.sum():.0f} left out, discs hold "
+        f"{held.sum() / lines.sum():.1%}"
+    )
+
+
+if __name__ == "__main__":
+    main()

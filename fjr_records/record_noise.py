@@ -1,0 +1,128 @@
+"""Noise of records that do not repeat in periods: from repeats, a standstill, or the highest lines.
+
+Encoder noise is white, a motion of masses is not: it falls off by four powers of frequency in
+power. So the highest lines show the noise of the position where they are flat. Where a record
+stands still its own scatter shows it, and where a reference was played twice half the power of the
+difference does, line by line, friction that scatters from run to run included.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+
+from .records import Record, RecordSet
+
+NoiseSource = Literal["repeats", "standstill", "residual", "none"]
+
+_TOP = 0.75  # of the lines, above which only noise is expected
+_FLAT = 2.0  # greatest ratio of power between the halves of these lines that counts as flat
+_STILL_S = 0.2
+_STILL = 1e-3  # of the travelled range: the most that a standing axis moves
+_LEAST_STILL = 50  # samples
+
+
+@dataclass(frozen=True)
+class RecordNoise:
+    """What is known of the noise of the position.
+
+    Attributes:
+        source: what it was found from; none if nothing shows it.
+        std_rad: standard deviation of one sample of white noise; NaN if not known.
+    """
+
+    source: NoiseSource
+    std_rad: float
+
+    @property
+    def known(self) -> bool:
+        """Whether any noise is known, so that something can be significant."""
+        return self.source != "none"
+
+
+def record_noise(records: RecordSet) -> RecordNoise:
+    """Return the noise of the position, by the best evidence that the records hold."""
+    repeated = _of_repeats(records)
+    if repeated is not None:
+        return RecordNoise("repeats", repeated)
+    still = [s for s in map(_standstill, records.records) if s is not None]
+    if still:
+        return RecordNoise("standstill", float(np.sqrt(np.mean(np.square(still)))))
+    found = [floor for floor in (_floor(r.position) for r in records.records) if floor is not None]
+    if found:
+        return RecordNoise("residual", float(np.median(found)))
+    return RecordNoise("none", float("nan"))
+
+
+def _of_repeats(records: RecordSet) -> float | None:
+    """Return the white part of what differs between repeats; None if there are none."""
+    floors = []
+    for group in records.repeats:
+        for one, other in pairwise(group):
+            difference = records.records[one].position - records.records[other].position
+            floor = _floor(difference)
+            if floor is None:
+                floor = _steps(difference)
+            if floor is not None:
+                floors.append(floor / np.sqrt(2.0))
+    return float(np.median(floors)) if floors else None
+
+
+def _floor(signal: np.ndarray) -> float | None:
+    """Return the standard deviation of white noise that the highest lines show; None if not."""
+    window = np.hanning(signal.size)
+    power = np.abs(np.fft.rfft((signal - signal.mean()) * window)) ** 2 / np.sum(window**2)
+    top = power[int(_TOP * power.size) : -1]
+    lower, upper = (float(np.median(half)) / np.log(2.0) for half in np.array_split(top, 2))
+    if not upper > 0.0 or lower > _FLAT * upper:
+        return None
+    return float(np.sqrt(0.5 * (lower + upper)))
+
+
+def _steps(difference: np.ndarray) -> float | None:
+    """Return what second differences show of white noise; None if they show nothing."""
+    second = np.diff(difference, 2)
+    deviation = float(np.median(np.abs(second))) / 0.6745 / np.sqrt(6.0)
+    return deviation or None
+
+
+def _standstill(record: Record) -> float | None:
+    """Return the scatter of the position where the axis stands; None if it never does."""
+    rate = record.description.sample_rate_hz
+    length = max(int(_STILL_S * rate), _LEAST_STILL)
+    position = record.position
+    count = position.size // length
+    if count < 2:
+        return None
+    pieces = position[: count * length].reshape(count, length)
+    travel = float(np.ptp(position))
+    still = pieces[np.ptp(pieces, axis=1) < _STILL * travel]
+    scatter = [_detrended(piece) for piece in still]
+    scatter = [value for value in scatter if value > 0.0]
+    return float(np.median(scatter)) if scatter else None
+
+
+def _detrended(piece: np.ndarray) -> float:
+    time = np.arange(piece.size)
+    rest = piece - np.polyval(np.polyfit(time, piece, 2), time)
+    return float(np.sqrt(np.sum(rest**2) / (piece.size - 3)))
+
+
+def band_lines(power: Sequence[float] | np.ndarray, noise_power: float, least: int = 8) -> int:
+    """Return how many lines from the lowest on hold a signal.
+
+    Args:
+        power: (lines,), mean power of each line over windows and records.
+        noise_power: of one line; NaN if not known.
+        least: fewest lines to return.
+    """
+    power = np.asarray(power)
+    floor = 4.0 * noise_power if np.isfinite(noise_power) else 1e-12 * power.max(initial=0.0)
+    smooth = np.convolve(power, np.ones(5) / 5.0, "same")
+    above = np.flatnonzero(smooth > floor)
+    last = int(above[-1]) + 1 if above.size else 0
+    return min(max(last, least), power.size)

@@ -1,0 +1,16 @@
+"""Where the bare plant's parameters stand among those that the kernels take."""
+
+from __future__ import annotations
+
+import math
+
+from fjr_kit.compiled import inlined
+
+JM, J, FS, FSM, FV, FVM, K0, K1, LINK_BRISTLES, MOTOR_BRISTLES = range(10)
+"""The stiffnesses of the bristles (`presliding`) are there only with effects."""
+
+
+@inlined
+def is_rigid(p):
+    """Tell whether the link is one that nothing moves, since the axis is rigid."""
+    return p[J] == math.inf

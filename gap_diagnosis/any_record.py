@@ -1,0 +1,120 @@
+"""Diagnosis of whatever a folder holds: steady periods, or records as they came."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from fjr_interface.bags.reader import DEFAULT, BagReader, SignalMap, find_bags
+from fjr_interface.experiment import RecordDescription
+from fjr_interface.resampling.accuracy import Resampling
+from fjr_kit.errors import InputError
+from fjr_records.experiment_folder import Override
+from fjr_records.recorded import RecordedExperiment, read_experiment
+from fjr_records.records import RecordSet, read_records, reference_optional
+
+from .investigation import Investigation, investigate
+from .outcome.diagnosis import Diagnosis
+from .record_investigation import RecordInvestigation, investigate_records
+from .which.search_space import TOLERANCE
+
+Progress = Callable[[str], None]
+
+
+def diagnose(
+    folder: Path | str,
+    nominal: Mapping[str, float],
+    *,
+    tolerance: float = TOLERANCE,
+    effects: Sequence[str] | None = None,
+    budget_s: float = math.inf,
+    progress: Progress = lambda _: None,
+) -> Diagnosis:
+    """Diagnose the gap between the rig that recorded a folder of bags and its nominal simulation.
+
+    Args:
+        folder: experiment folder of bags, periodic or not.
+        nominal: datasheet values of the bare plant's parameters in SI units, by the names of
+            `fjr_sim_node.plant.PLANT`; `read_nominal` reads them from a parameter file.
+        tolerance: how far a datasheet value may be off, relative.
+        effects: identifiers to look for; None for all.
+        budget_s: time after which nothing new is tried.
+        progress: told which stage begins.
+
+    Returns:
+        The diagnosis; `investigate_any` returns its evidence as well, for `write_diagnosis`.
+
+    Raises:
+        InputError: damaged bags, bags of different rigs, a controller of an unknown kind, or an
+            effect of an unknown name.
+    """
+    return investigate_any(
+        read_any(folder), nominal, tolerance=tolerance, effects=effects, budget_s=budget_s,
+        progress=progress,
+    ).diagnosis  # fmt: skip
+
+
+def read_any(
+    folder: Path | str,
+    signal_map: SignalMap = DEFAULT,
+    *,
+    override: Override | None = None,
+    resampling: Resampling | None = None,
+    as_record: bool = False,
+) -> RecordedExperiment | RecordSet:
+    """Read a folder as steady periods where it has them, else as records.
+
+    Bags say by their description which they are. Of bags without one the period is looked for.
+
+    Args:
+        folder: experiment folder.
+        signal_map: which topics and fields are the signals.
+        override: period, transient and number of periods, instead of what the bags say.
+        resampling: how to bring unevenly sampled bags onto an even grid; None refuses them.
+        as_record: whether to take steady periods as records, too.
+
+    Raises:
+        InputError: see `read_experiment` and `read_records`; or periods that are set for records.
+    """
+    periods = override if override not in (None, Override()) else None
+    optional = reference_optional(signal_map)
+    kinds = [BagReader(bag, optional).experiment for bag in find_bags(folder)]
+    if as_record or any(isinstance(kind, RecordDescription) for kind in kinds):
+        if periods is not None:
+            raise InputError(
+                f"{folder}: records are not cut into periods; leave out the number of periods, of "
+                "transient periods and of samples per period."
+            )
+        return read_records(folder, signal_map, resampling=resampling)
+    try:
+        return read_experiment(folder, signal_map, override=override, resampling=resampling)
+    except InputError as error:
+        if periods is not None or any(kind is not None for kind in kinds):
+            raise
+        records = read_records(folder, signal_map, resampling=resampling)
+        why = str(error).split(";")[0].rstrip(".")
+        note = f"Diagnosed as records, since no steady periods were found ({why})."
+        return replace(records, notes=(note, *records.notes))
+
+
+def investigate_any(
+    recorded: RecordedExperiment | RecordSet,
+    nominal: Mapping[str, float],
+    *,
+    tolerance: float = TOLERANCE,
+    effects: Sequence[str] | None = None,
+    budget_s: float = math.inf,
+    progress: Progress = lambda _: None,
+) -> Investigation | RecordInvestigation:
+    """Diagnose what `read_any` has read and keep all the evidence; arguments as of `diagnose`."""
+    if isinstance(recorded, RecordSet):
+        return investigate_records(
+            recorded, nominal, tolerance=tolerance, effects=effects, budget_s=budget_s,
+            progress=progress,
+        )  # fmt: skip
+    return investigate(
+        recorded, nominal, tolerance=tolerance, effects=effects, budget_s=budget_s,
+        progress=progress,
+    )  # fmt: skip

@@ -1,0 +1,254 @@
+"""Unknown gains of a known controller, solved from a record of r, u and y.
+
+u is what the controller made of the recorded r and y, whatever the plant did: without noise on u
+its gains come out exact. Most of them enter linearly, as does the state in which the controller was
+before the first sample; time constants and products of gains are searched, the rest solved within
+(variable projection; Golub, Pereyra, Inverse Problems 19, 2003).
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from controller_node.gains import FreeGain, free_gains
+from controller_node.law import as_transfer_function, law_of
+from controller_node.transfer_function import TransferFunction
+from fjr_kit.errors import InputError
+
+from .controller_check import clamp_nm
+
+_LIMIT = "torque_limit_nm"
+_CURVED = {"n", "velocity_filter_rad_s", "integral_time_s"}
+_TIMES = {"k_position": "k_velocity", "setpoint_weight": "p"}  # a gain, and by which it multiplies
+_TRIALS = 7  # values of each searched gain at which the search may begin
+_MOST_SEARCHED = 2
+_BEGIN = 2
+_TIGHT = {"xtol": 1e-14, "ftol": 1e-14, "gtol": 1e-14}
+_STEP = 1e-5
+_BEYOND = 3.0
+_SEARCH_SAMPLES = 10_000
+_BLOCKS = 60
+_SINGULAR = 1e-9
+
+
+@dataclass(frozen=True)
+class IdentifiedGains:
+    """Gains of a controller as a record shows them.
+
+    Attributes:
+        values: each unknown gain by its name; a torque limit of infinity was not reached.
+        standard_errors: of each, from the scatter of blocks, so that a residual that is not white
+            counts; infinite where the record does not show the gain, zero for a torque limit.
+        explained: fraction of the torque's variance that the law then explains, where it is not
+            clamped; 1 is all, 0 and below nothing.
+    """
+
+    values: dict[str, float]
+    standard_errors: dict[str, float]
+    explained: float
+
+
+def identify_gains(
+    controller: Mapping[str, Any],
+    reference: np.ndarray,
+    torque: np.ndarray,
+    position: np.ndarray,
+    sample_rate_hz: float,
+) -> IdentifiedGains:
+    """Solve for the unknown gains of a `controller` entry by least squares of the torque.
+
+    Args:
+        controller: the entry, with gains that are unknown.
+        reference: r in rad, float64 (samples,), or (runs, samples) for runs of one controller.
+        torque: u in N m, likewise.
+        position: y in rad, likewise, as the controller saw it.
+        sample_rate_hz: their rate.
+
+    Raises:
+        InputError: nothing is unknown, the signals are unfit, or too many gains are searched for.
+    """
+    r, u, y = (np.atleast_2d(np.asarray(s, float)) for s in (reference, torque, position))
+    if not r.shape == u.shape == y.shape or not np.isfinite([r, u, y]).all():
+        raise InputError("Gains need reference, torque and position of one length, all finite.")
+    if not np.ptp(u) > 0.0:
+        raise InputError("Gains need a torque that moves; this record has none.")
+    scale = float(np.std(u)), float(np.std(r - y)) or 1.0
+    gains = free_gains(controller, sample_rate_hz, *scale)
+    if not gains:
+        raise InputError("No gain of this controller is unknown, so there is none to identify.")
+    known = controller.get(_LIMIT)
+    clamp = clamp_nm(u.ravel(), math.inf if known is None else float(known))
+    record = _Record(dict(controller), sample_rate_hz, r, u, y, np.abs(u) < clamp)
+    solved = _solved(record, gains)
+    if all(gain.name != _LIMIT for gain in gains):
+        return solved
+    limit = clamp if record.reaches(clamp, solved) else math.inf
+    return IdentifiedGains(
+        {**solved.values, _LIMIT: limit},
+        {**solved.standard_errors, _LIMIT: 0.0},
+        solved.explained,
+    )
+
+
+@dataclass(frozen=True)
+class _Record:
+    """Runs of one controller, (runs, samples) each; free: where the torque is not clamped."""
+
+    controller: dict[str, Any]
+    rate: float
+    r: np.ndarray
+    u: np.ndarray
+    y: np.ndarray
+    free: np.ndarray
+
+    def thinned(self) -> _Record:
+        """Return the record with few enough free samples for a search."""
+        every = 1 + self.free.size // _SEARCH_SAMPLES
+        return replace(self, free=self.free & (np.arange(self.free.shape[1]) % every == 0))
+
+    def law(self, gains: Mapping[str, float]) -> TransferFunction:
+        """Return the law with these gains and any limit."""
+        missing = {_LIMIT: math.inf} if _LIMIT in self.controller["unknown"] else {}
+        return as_transfer_function(law_of(self.controller, self.rate, {**gains, **missing}))
+
+    def torque(self, law: TransferFunction) -> np.ndarray:
+        """Return the torque of a law from zero state where the record's is free, (F,)."""
+        runs = [law.unlimited(r, y) for r, y in zip(self.r, self.y, strict=True)]
+        return np.stack(runs)[self.free]
+
+    def reaches(self, clamp: float, solved: IdentifiedGains) -> bool:
+        """Tell whether the law goes beyond a torque at which the record often ends.
+
+        A torque in coarse counts ends there, too, without being clamped.
+        """
+        law = self.law(solved.values)
+        beyond = []
+        for r, u, y, free in zip(self.r, self.u, self.y, self.free, strict=True):
+            state = law.entering_state(r, y, u, free)
+            beyond.append(np.abs(law.unlimited(r, y, state))[~free] - clamp)
+        scatter = math.sqrt(max(1.0 - solved.explained, 0.0)) * float(np.std(self.u[self.free]))
+        ends = np.concatenate(beyond)
+        return bool(ends.size) and float(np.median(ends)) > _BEYOND * scatter
+
+    def equations(
+        self, linear: Sequence[str], searched: Mapping[str, float]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return A (F, linear gains + states) and b (F,): u = A x + b for these searched gains."""
+        zero, one = (dict.fromkeys(linear, value) for value in (0.0, 1.0))
+        offset = self.torque(self.law({**searched, **zero}))
+        columns = [
+            self.torque(self.law({**searched, **zero, name: 1.0})) - offset for name in linear
+        ]
+        entered = self.law({**searched, **one}).free_responses(self.r.shape[1])
+        for run, state in itertools.product(range(len(self.r)), entered.T):
+            signal = np.zeros_like(self.r)
+            signal[run] = state
+            columns.append(signal[self.free])
+        return np.reshape(columns, (len(columns), offset.size)).T, offset
+
+
+def _solved(record: _Record, gains: Sequence[FreeGain]) -> IdentifiedGains:
+    """Return all gains but a torque limit."""
+    names = {gain.name for gain in gains}
+    searched = [g for g in gains if g.name in _CURVED or _TIMES.get(g.name) in names]
+    at = {gain.name for gain in searched}
+    linear = [g.name for g in gains if g.name not in at and g.name != _LIMIT]
+    if len(searched) > _MOST_SEARCHED:
+        raise InputError(
+            f"{', '.join(sorted(at))} cannot all be told from one torque; give values for all but "
+            f"{_MOST_SEARCHED}."
+        )
+    measured = record.u[record.free]
+
+    def model(
+        point: np.ndarray, weights: np.ndarray | None = None, of: _Record = record
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the modelled torque, its columns and their weights at values of the search."""
+        columns, offset = of.equations(linear, _values(searched, point))
+        if weights is None:
+            weights = _least_squares(columns, of.u[of.free] - offset)
+        weights = np.pad(weights, (0, max(columns.shape[1] - weights.size, 0)))
+        return columns @ weights[: columns.shape[1]] + offset, columns, weights
+
+    def errors(point: np.ndarray, of: _Record = record) -> np.ndarray:
+        return (model(point, of=of)[0] - of.u[of.free]) / np.std(measured)
+
+    point = np.zeros(0)
+    if searched:
+        point = _searched(partial(errors, of=record.thinned()), searched)
+        point = least_squares(errors, point, bounds=_bounds(searched), **_TIGHT).x
+    torque, columns, weights = model(point)
+    slopes = [(model(point + h, weights)[0] - torque) / h.sum() for h in _STEP * np.eye(point.size)]
+    deviations = _standard_errors(np.column_stack([*slopes, columns]), measured - torque)
+    # Searched on a logarithm, the error is one of the logarithm.
+    values = _values(searched, point)
+    units = [values[gain.name] if gain.logarithmic else 1.0 for gain in searched]
+    deviations[: len(units)] *= units
+    found = {**values, **dict(zip(linear, weights.tolist(), strict=False))}
+    explained = 1.0 - float(np.var(measured - torque) / np.var(measured))
+    return IdentifiedGains(found, dict(zip(found, deviations.tolist(), strict=False)), explained)
+
+
+def _searched(
+    errors: Callable[[np.ndarray], np.ndarray], searched: Sequence[FreeGain]
+) -> np.ndarray:
+    """Return the point that fits best, begun at the best points of a grid."""
+    low, high = _bounds(searched)
+    inner = np.linspace(0.0, 1.0, _TRIALS + 2)[1:-1]
+    grid = [low + np.array(p) * (high - low) for p in itertools.product(inner, repeat=low.size)]
+    trials = sorted(grid, key=lambda point: _sum_of_squares(errors(point)))
+    fits = [least_squares(errors, point, bounds=(low, high)) for point in trials[:_BEGIN]]
+    return min(fits, key=lambda fit: fit.cost).x
+
+
+def _bounds(searched: Sequence[FreeGain]) -> tuple[np.ndarray, np.ndarray]:
+    low = np.array([_on_scale(gain, gain.low) for gain in searched])
+    return low, np.array([_on_scale(gain, gain.high) for gain in searched])
+
+
+def _sum_of_squares(errors: np.ndarray) -> float:
+    return float(errors @ errors)
+
+
+def _on_scale(gain: FreeGain, value: float) -> float:
+    return math.log(value) if gain.logarithmic else value
+
+
+def _values(gains: Sequence[FreeGain], point: np.ndarray) -> dict[str, float]:
+    return {
+        gain.name: math.exp(at) if gain.logarithmic else float(at)
+        for gain, at in zip(gains, point, strict=True)
+    }
+
+
+def _least_squares(columns: np.ndarray, target: np.ndarray) -> np.ndarray:
+    """Return the least-squares solution, columns of any size."""
+    size = np.linalg.norm(columns, axis=0)
+    size[size == 0.0] = 1.0
+    return np.linalg.lstsq(columns / size, target, rcond=None)[0] / size
+
+
+def _standard_errors(jacobian: np.ndarray, left: np.ndarray) -> np.ndarray:
+    """Return the standard errors of a least-squares solution, by blocks of the residual.
+
+    The scores of blocks are nearly independent, whatever the colour of the residual within them
+    (the sandwich estimator; White, Econometrica 48, 1980).
+    """
+    size = np.linalg.norm(jacobian, axis=0)
+    size[size == 0.0] = 1.0
+    _, s, vt = np.linalg.svd(np.linalg.qr(jacobian / size, mode="r"))
+    kept = s > _SINGULAR * s[0]
+    inverse = (vt[kept].T / s[kept] ** 2) @ vt[kept]
+    scores = (jacobian / size) * left[:, None]
+    blocks = np.array([block.sum(axis=0) for block in np.array_split(scores, _BLOCKS)])
+    errors = np.sqrt(np.maximum(np.diag(inverse @ (blocks.T @ blocks) @ inverse), 0.0)) / size
+    errors[np.abs(vt[~kept]).max(axis=0, initial=0.0) > math.sqrt(_SINGULAR)] = math.inf
+    return errors

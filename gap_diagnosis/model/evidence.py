@@ -1,0 +1,213 @@
+"""Evidence of records: the error of a model in windows and lines, cell by cell and part by part.
+
+The error y_model - y is taken apart by the lapped transform (`lapped`). Its numbers stand in
+**cells**, one for each level and band: what noise and the remainder of the best model leave is
+alike within one, and is estimated there. They also stand in **parts**, blocks of windows of one
+record: some parts are for fitting, others for selecting, others for reporting.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from fjr_records.record_noise import RecordNoise, band_lines, record_noise
+from fjr_records.records import RecordSet
+
+from .lapped import lapped, windows_in
+from .record_rig import RecordSimulator
+from .simulated_rig import Model
+
+Purpose = Literal["fit", "select", "report"]
+
+WINDOWS = 24
+"""Windows into which the shortest record is cut, at least."""
+_LONGEST_WINDOW_S = 4.0
+_WINDOWS_PER_BLOCK = 2
+_PURPOSES: tuple[Purpose, ...] = ("fit", "select", "report")
+_CYCLE: tuple[Purpose, ...] = ("fit", "select", "fit", "report")
+"""Purposes of the blocks of a level's only record, shifted from level to level: what one time of
+the record shows serves all purposes."""
+_SIMULATION = 1e-3  # error of the simulation itself, relative to the rms of a cell
+_DIVERGED = 1e6
+
+
+@dataclass(frozen=True)
+class Part:
+    """Some windows of one record.
+
+    Attributes:
+        record: its index.
+        level: index of its level.
+        windows: which windows.
+        purpose: what it is for.
+    """
+
+    record: int
+    level: int
+    windows: slice
+    purpose: Purpose
+
+
+class Evidence:
+    """The errors of models on records.
+
+    Attributes:
+        records: the runs.
+        noise: of their positions.
+        simulator: plays them.
+        parts: blocks of windows; every window inside a record belongs to one.
+        hop: half the length of a window, samples.
+        lines: how many lines hold a signal, from line 0 on.
+        edges: (bands + 1,), first line of each band; band 0 is line 0, mean and slow motion.
+    """
+
+    def __init__(self, records: RecordSet) -> None:
+        """Cut the records; raise InputError for a controller that is described badly."""
+        self.records = records
+        rate = records.sample_rate_hz
+        shortest = min(r.samples for r in records.records)
+        hop = min(shortest / (WINDOWS + 1), 0.5 * _LONGEST_WINDOW_S * rate)
+        self.hop = max(2 * int(hop / 2), 8)
+        self._measured = [lapped(r.position, self.hop) for r in records.records]
+        self.noise: RecordNoise = record_noise(records)
+        power = np.mean(np.concatenate(self._measured) ** 2, axis=0)
+        self.lines = band_lines(power, self.noise.std_rad**2)
+        self.edges = _edges(self.lines)
+        self.simulator = RecordSimulator(records, self.noise, self.lines * self.line_hz)
+        self.parts = tuple(_parts(records, self.hop))
+        self._band = np.searchsorted(self.edges, np.arange(self.lines), side="right") - 1
+
+    @property
+    def line_hz(self) -> float:
+        """Width of a line (Hz)."""
+        return 0.5 * self.records.sample_rate_hz / self.hop
+
+    @property
+    def bands(self) -> int:
+        """Number of bands."""
+        return len(self.edges) - 1
+
+    @cached_property
+    def cells(self) -> int:
+        """Number of cells."""
+        return len(self.records.levels) * self.bands
+
+    def parts_for(self, *purposes: Purpose) -> tuple[int, ...]:
+        """Return the indices of the parts for some purposes."""
+        return tuple(i for i, part in enumerate(self.parts) if part.purpose in purposes)
+
+    @property
+    def reporting(self) -> tuple[int, ...]:
+        """The parts that all figures are computed on; the others where none reports."""
+        return self.parts_for("report") or self.parts_for("select", "fit")
+
+    def errors(self, models: Sequence[Model], which: Sequence[int]) -> np.ndarray:
+        """Return the errors of models on parts, float64 (models, errors), rad.
+
+        A model whose motion diverges has errors of 1e6 times the motion.
+        """
+        needed = sorted({self.parts[i].record for i in which})
+        rows = []
+        for runs in self.simulator.run(models, needed):
+            lines = {
+                index: self.lines_of(run[0], index) for index, run in zip(needed, runs, strict=True)
+            }
+            pieces = [lines[self.parts[i].record][self.parts[i].windows].ravel() for i in which]
+            rows.append(np.concatenate(pieces))
+        return np.array(rows)
+
+    def lines_of(self, position: np.ndarray, index: int) -> np.ndarray:
+        """Return the lines of the error of a simulated position of one record, (windows, lines)."""
+        measured = self._measured[index][:, : self.lines]
+        if not np.isfinite(position).all():
+            return np.full(measured.shape, _DIVERGED * np.abs(measured).max())
+        return lapped(position, self.hop)[:, : self.lines] - measured
+
+    def measured(self, which: Sequence[int]) -> np.ndarray:
+        """Return the lines of the measured position on parts, (errors,), rad."""
+        pieces = [
+            self._measured[self.parts[i].record][self.parts[i].windows, : self.lines].ravel()
+            for i in which
+        ]
+        return np.concatenate(pieces)
+
+    def changes(self, positions: dict[int, np.ndarray], which: Sequence[int]) -> np.ndarray:
+        """Return the lines of changes of y on parts, (errors,), by the index of the record."""
+        lines = {i: lapped(change, self.hop)[:, : self.lines] for i, change in positions.items()}
+        pieces = [lines[self.parts[i].record][self.parts[i].windows].ravel() for i in which]
+        return np.concatenate(pieces)
+
+    def cell_of(self, which: Sequence[int]) -> np.ndarray:
+        """Return the cell of each error on parts, int (errors,)."""
+        return np.concatenate(
+            [
+                np.tile(
+                    self.records.levels.index(self.parts[i].level) * self.bands + self._band,
+                    self.windows(i),
+                )
+                for i in which
+            ]
+        )
+
+    def part_of(self, which: Sequence[int]) -> np.ndarray:
+        """Return the index of the part of each error, int (errors,)."""
+        return np.repeat(which, [self.windows(i) * self.lines for i in which])
+
+    def windows(self, part: int) -> int:
+        """Return the number of windows of a part."""
+        return self.parts[part].windows.stop - self.parts[part].windows.start
+
+    def floor(self, which: Sequence[int]) -> np.ndarray:
+        """Return the least variance of a cell, (cells,): noise and the simulation's own error."""
+        noise = self.noise.std_rad**2 if self.noise.known else 0.0
+        return noise + (_SIMULATION**2) * self.mean_squares(self.measured(which), which) + 1e-30
+
+    def mean_squares(self, values: np.ndarray, which: Sequence[int]) -> np.ndarray:
+        """Return the mean square of numbers on parts in each cell, (cells,); 0 where none is."""
+        cell = self.cell_of(which)
+        count = np.bincount(cell, minlength=self.cells)
+        total = np.bincount(cell, values**2, self.cells)
+        return total / np.maximum(count, 1)
+
+
+def _edges(lines: int) -> np.ndarray:
+    """Return the first line of each band: line 0 alone, then bands an octave wide or less."""
+    edges = [0, 1]
+    while edges[-1] < lines:
+        edges.append(min(edges[-1] + max(edges[-1], 4), lines))
+    return np.array(edges)
+
+
+def _parts(records: RecordSet, hop: int) -> list[Part]:
+    """Cut records into parts, and give each a purpose.
+
+    Levels of three records or more have whole records for each purpose; of two, the second one
+    selects and reports, block by block; a single one serves all three.
+    """
+    parts = []
+    for number, level in enumerate(records.levels):
+        members = [i for i, r in enumerate(records.records) if r.level == level]
+        members.sort(key=lambda i: -float(np.abs(records.records[i].torque).max()))
+        for place, index in enumerate(members):
+            count = windows_in(records.records[index].samples, hop)
+            blocks = max(count // _WINDOWS_PER_BLOCK, 1)
+            ends = np.linspace(0, count, blocks + 1).astype(int)
+            for block in range(blocks):
+                purpose = _purpose(len(members), place, block + number)
+                parts.append(
+                    Part(index, level, slice(int(ends[block]), int(ends[block + 1])), purpose)
+                )
+    return parts
+
+
+def _purpose(records: int, place: int, block: int) -> Purpose:
+    if records >= 3:
+        return _PURPOSES[place % 3]
+    if records == 2:
+        return "fit" if place == 0 else _PURPOSES[1 + block % 2]
+    return _CYCLE[block % 4]

@@ -1,0 +1,154 @@
+"""The simulated rig under recorded runs that do not repeat: each is played from its true start.
+
+Where controller and references are known, the loop itself is simulated. Else the recorded torque
+drives the model, and an observer holds its motion to the recorded position (`prediction`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from controller_node.transfer_function import TransferFunction
+from fjr_kit.errors import InputError
+from fjr_records.record_noise import RecordNoise
+from fjr_records.records import Record, RecordSet
+from fjr_sim_node.simulation.closed_loop import Trajectory, simulate_law
+
+from .prediction import CROSSOVER_SHARE, lead
+from .record_loop import RecordLoop, loop_of
+from .simulated_rig import Model, run_parallel
+
+_AT_REST = 5.0  # standard deviations of noise that a record at rest may begin away from zero
+_FIRST_SAMPLES = 10
+_NEAR = 1.5  # lines within this factor of the crossover give the plant's gain there
+
+
+class RecordSimulator:
+    """Plays recorded runs with models, without noise.
+
+    Attributes:
+        records: what is played.
+        loop: how the loop is known.
+        crossover_hz: crossover of the observer.
+    """
+
+    def __init__(self, records: RecordSet, noise: RecordNoise, top_hz: float) -> None:
+        """Take the signals that drive the simulation.
+
+        Args:
+            records: the runs.
+            noise: of their positions.
+            top_hz: highest frequency at which the position holds a signal.
+
+        Raises:
+            InputError: a controller that is described badly.
+        """
+        self.records = records
+        self._rate = records.sample_rate_hz
+        self.loop: RecordLoop = loop_of(records)
+        self._starts = [_start(r, noise) for r in records.records]
+        self.crossover_hz = CROSSOVER_SHARE * top_hz
+        self._observer = _observer(records, self.crossover_hz)
+        self._entries = [
+            law.entering_state(r.reference, r.position, r.torque)
+            if start != (0.0, 0.0) and r.reference is not None
+            else None
+            for law, r, start in zip(self.loop.laws, records.records, self._starts, strict=False)
+        ]
+
+    def response(self, frequency_hz: np.ndarray, index: int) -> np.ndarray:
+        """Return C_y of what holds a run: its controller, or the observer; complex, N m/rad."""
+        law = self._observer if self.loop.kind == "unknown" else self.loop.laws[index]
+        return law.response(frequency_hz, self._rate)[1]
+
+    def run(self, models: Sequence[Model], which: Sequence[int]) -> list[list[np.ndarray]]:
+        """Return y, u and q of each model in each run.
+
+        Args:
+            models: the models.
+            which: indices of the runs.
+
+        Returns:
+            for each model, for each run, float64 (3, samples): rad, N m, rad; NaN where the motion
+            diverges.
+        """
+        jobs = [(model, index) for model in models for index in which]
+        found = run_parallel(self._one, jobs)
+        return [found[i * len(which) : (i + 1) * len(which)] for i in range(len(models))]
+
+    def missing_torque(self, model: Model, which: Sequence[int]) -> list[np.ndarray]:
+        """Return the torque that an observer must add to hold a model to each recorded motion.
+
+        Returns:
+            float64 (samples,) for each run, N m; NaN where the motion diverges.
+        """
+        return run_parallel(self._missing, [(model, index) for index in which])
+
+    def _missing(self, job: tuple[Model, int]) -> np.ndarray:
+        model, index = job
+        record = self.records.records[index]
+        try:
+            return self._observed(model, index).torque - record.torque
+        except InputError:
+            return np.full(record.samples, np.nan)
+
+    def _observed(self, model: Model, index: int) -> Trajectory:
+        record, (p, e) = self.records.records[index], _coefficients(model)
+        return simulate_law(
+            record.position, self._rate, p, self._observer, None, e,
+            added_torque=record.torque, start=self._starts[index],
+        )  # fmt: skip
+
+    def _one(self, job: tuple[Model, int]) -> np.ndarray:
+        model, index = job
+        try:
+            run = self._simulated(model, index)
+        except InputError:
+            return np.full((3, self.records.records[index].samples), np.nan)
+        return np.array([run.position, run.torque, run.motor if model.rigid else run.link])
+
+    def _simulated(self, model: Model, index: int) -> Trajectory:
+        if self.loop.kind == "unknown":
+            return self._observed(model, index)
+        record, (p, e) = self.records.records[index], _coefficients(model)
+        assert record.reference is not None
+        return simulate_law(
+            record.reference, self._rate, p, self.loop.laws[index], None, e,
+            start=self._starts[index], controller_state=self._entries[index],
+        )  # fmt: skip
+
+
+def _coefficients(model: Model) -> tuple[tuple[float, ...], tuple[float, ...] | None]:
+    return model.plant_coefficients, model.effect_coefficients
+
+
+def _start(record: Record, noise: RecordNoise) -> tuple[float, float]:
+    """Return position (rad) and velocity (rad/s) at the first sample; zero where noise explains."""
+    first = record.position[:_FIRST_SAMPLES]
+    std = noise.std_rad if noise.known else 0.0
+    if np.abs(first).max() <= _AT_REST * std:
+        return 0.0, 0.0
+    time = np.arange(first.size) / record.description.sample_rate_hz
+    if np.ptp(first) <= 2.0 * _AT_REST * std:
+        return float(first.mean()), 0.0
+    speed, position = np.polyfit(time, first, 1)
+    return float(position), float(speed)
+
+
+def _observer(records: RecordSet, crossover_hz: float) -> TransferFunction:
+    """Return a lead that crosses over with the measured response of torque to position."""
+    ratios = []
+    for record in records.records:
+        frequency = np.fft.rfftfreq(record.samples, 1.0 / records.sample_rate_hz)
+        with np.errstate(divide="ignore"):
+            apart = np.abs(np.log(frequency / crossover_hz))
+        near = apart <= max(np.log(_NEAR), apart.min())
+        window = np.hanning(record.samples)
+        u, y = (
+            np.abs(np.fft.rfft(window * (s - s.mean())))[near]
+            for s in (record.torque, record.position)
+        )
+        ratios.append(float(np.sqrt(np.sum(u**2) / max(np.sum(y**2), 1e-300))))
+    return lead(float(np.median(ratios)), crossover_hz, records.sample_rate_hz)

@@ -1,0 +1,122 @@
+"""Causes, remainder and evidence of a diagnosis in words, and numbers with the digits they bear."""
+
+from __future__ import annotations
+
+import math
+
+from .diagnosis import Cause, Diagnosis, Estimate, EvidenceKind, Figure, Place
+from .verdict_words import explanation
+
+NOISE: dict[str, str] = {
+    "repeats": "The noise is known from what repeats.",
+    "standstill": "The noise is known from a standstill of the axis.",
+    "residual": "The noise is known from the highest frequencies, where the position is flat.",
+    "none": "The noise is not known, so nothing is said of significance.",
+}
+REPORTED: dict[str, str] = {
+    "records": "All figures are of whole records that no fit has seen.",
+    "blocks": "All figures are of blocks of the records that no fit has seen.",
+    "none": "All figures are of the data that were fitted: nothing was held out.",
+}
+CONTROLLER: dict[str, str] = {
+    "known": "The controller is known, so the closed loop was simulated.",
+    "gains_fitted": "The controller is known but for its gains, which were fitted.",
+    "unknown": "The controller is not known, so an observer held the model to the recorded motion.",
+}
+EXCITATION: dict[str, str] = {
+    "periodic": "Steady periods were compared.",
+    "record": "The records were compared as they came, in windows.",
+}
+_MOST_DIGITS = 6
+_AS_NOISE = 1.5  # times what noise leaves: a remainder no greater than that has no look of its own
+
+
+def evidence_sentences(evidence: EvidenceKind) -> list[str]:
+    """Return what the diagnosis rests on, a sentence for each kind of evidence."""
+    return [
+        EXCITATION[evidence.excitation],
+        CONTROLLER[evidence.controller],
+        NOISE[evidence.noise],
+        REPORTED[evidence.reported_on],
+    ]
+
+
+def remainder_sentences(diagnosis: Diagnosis) -> list[str]:
+    """Return how large the remainder is, what it looks like and where it lies; empty if none."""
+    left = diagnosis.remainder
+    if left is None:
+        return []
+    said = []
+    floor = diagnosis.gap.noise_floor
+    noise = None if floor is None else floor.nrmse_position
+    if left.nrmse_position is not None and noise and left.nrmse_position < _AS_NOISE * noise:
+        return [f"{percent(left.nrmse_position)} of the motion remains, which noise explains."]
+    if left.nrmse_position is not None:
+        share = "" if left.share is None else f", {percent(left.share)} of the refit's squared gap"
+        said.append(f"{percent(left.nrmse_position)} of the motion remains{share}.")
+    if left.looks_like:
+        said.append(f"The torque that is still missing goes with {'; '.join(left.looks_like)}.")
+    elif left.where:
+        said.append("The torque that is still missing goes with no quantity that was tried.")
+    if left.where:
+        said.append(f"It is strongest at {'; '.join(map(place_words, left.where))}.")
+    return said
+
+
+def place_words(place: Place) -> str:
+    """Return a place as shown to a person, such as 'level 1, 3.1 to 16 Hz (4.4 sigma)'."""
+    low, high = map(hertz, place.band_hz)
+    band = f"0 to {high} Hz" if place.lines == "slow" else f"{low} to {high} Hz"
+    kind = "" if place.lines in ("all", "slow") else f", {place.lines} lines"
+    sigma = f" ({place.sigma:.2g} \N{GREEK SMALL LETTER SIGMA})" if known(place.sigma) else ""
+    return f"level {place.level}, {band}{kind}{sigma}"
+
+
+def cause_name(cause: Cause) -> str:
+    """Return a cause with what cannot be told from it, such as 'gravity or torque bias'."""
+    return " or ".join(explanation([name]) for name in (cause.effect, *cause.others))
+
+
+def share_words(figure: Figure | None) -> str:
+    """Return a share with its interval, in percent; a dash where there is none."""
+    if figure is None or not known(figure.value):
+        return "-"
+    if figure.low is None or figure.high is None:
+        return percent(figure.value)
+    return f"{percent(figure.value)} ({100 * figure.low:.0f} to {percent(figure.high)})"
+
+
+def percent(ratio: float | None) -> str:
+    """Return a ratio in percent, with two digits below ten; a dash where it is not known."""
+    if ratio is None or not known(ratio):
+        return "-"
+    value = 100.0 * ratio
+    size = abs(value)
+    if size >= 9.95 or size == 0.0:
+        return f"{value:.0f}%"
+    return f"{value:.{max(1 - math.floor(math.log10(size)), 1)}f}%"
+
+
+def hertz(frequency: float) -> str:
+    """Return a frequency with two digits below a hundred, in whole hertz above."""
+    return f"{frequency:.2g}" if frequency < 99.5 else f"{frequency:.0f}"
+
+
+def digits(estimate: Estimate) -> tuple[str, str, str]:
+    """Return value, low and high end, to a tenth of half the interval's width."""
+    values = estimate.value, estimate.low, estimate.high
+    width = 0.5 * (estimate.high - estimate.low)
+    greatest = max(map(abs, values))
+    if not math.isfinite(width) or width <= 0.0 or not math.isfinite(greatest):
+        return tuple(f"{v:.4g}" if known(v) else "-" for v in values)  # type: ignore[return-value]
+    last = math.floor(math.log10(width)) - 1
+    last = max(last, math.floor(math.log10(greatest)) - _MOST_DIGITS + 1)
+    if 1e-6 <= greatest < 1e6:
+        return tuple(f"{v:.{max(-last, 0)}f}" for v in values)  # type: ignore[return-value]
+    shown = max(math.floor(math.log10(greatest)) - last, 0)
+    return tuple(f"{v:.{shown}e}" for v in values)  # type: ignore[return-value]
+
+
+def known(value: float | None) -> bool:
+    """Tell whether a figure is a finite number."""
+    return value is not None and math.isfinite(value)

@@ -1,0 +1,178 @@
+"""One diagnosis of records as they come: from runs that do not repeat to causes and a remainder."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from fjr_records.records import Record, RecordSet
+from fjr_sim_node import effects as fx
+
+from .model.evidence import Evidence
+from .model.simulated_rig import Model
+from .notes import OUT_OF_TIME
+from .outcome.diagnosis import Diagnosis
+from .record_judgement import FEWEST_PARTS, Tested, judge_records, tested_causes
+from .which.catalogue import catalogue
+from .which.cell_fits import CellFitter
+from .which.search_space import TOLERANCE
+from .which.stepwise import Found, Stepwise, gain, stands_for
+
+Progress = Callable[[str], None]
+
+LONGEST_S = 300.0
+"""Of all records together, what is played at the most (s)."""
+
+
+@dataclass(frozen=True)
+class RecordInvestigation:
+    """Everything that a diagnosis of records rests on.
+
+    Attributes:
+        evidence: the records in windows, and what plays them.
+        nominal: the nominal model.
+        found: the steps of the search.
+        tested: the causes with their tests.
+        diagnosis: the outcome.
+    """
+
+    evidence: Evidence
+    nominal: Model
+    found: Found
+    tested: tuple[Tested, ...]
+    diagnosis: Diagnosis
+
+    @property
+    def recorded(self) -> RecordSet:
+        """The records."""
+        return self.evidence.records
+
+
+def investigate_records(
+    records: RecordSet,
+    nominal: Mapping[str, float],
+    *,
+    tolerance: float = TOLERANCE,
+    effects: Sequence[str] | None = None,
+    budget_s: float = math.inf,
+    progress: Progress = lambda _: None,
+) -> RecordInvestigation:
+    """Diagnose the gap between recorded runs and the nominal simulation.
+
+    Args:
+        records: from `fjr_records.records.read_records`.
+        nominal: datasheet values by the names of PLANT.
+        tolerance: how far one may be off, relative.
+        effects: identifiers to look for; None for all.
+        budget_s: time after which nothing new is tried.
+        progress: told what is done.
+
+    Raises:
+        InputError: records too short for any window, a controller that is described badly, or an
+            effect of an unknown name.
+    """
+    begun = time.monotonic()
+    model = Model.nominal(nominal)
+    names = catalogue(model.plant, effects)
+    records, cut = _within(records)
+    progress("windows and noise")
+    evidence = Evidence(records)
+    fitter = CellFitter(evidence, model.plant, tolerance)
+    found = Stepwise(fitter, names, progress, begun + budget_s).run()
+    found, tested = _kept(fitter, found, progress)
+    progress("what may stand in for a cause")
+    alternatives = {t.effect: _alternatives(fitter, found, t, names) for t in tested}
+    progress("judgement")
+    notes = [*records.notes, *cut, *_notes(evidence, found)]
+    diagnosis = judge_records(fitter, model, found, tested, alternatives, notes)
+    return RecordInvestigation(evidence, model, found, tuple(tested), diagnosis)
+
+
+def _within(records: RecordSet) -> tuple[RecordSet, list[str]]:
+    """Cut records that are too long together; say so."""
+    total = sum(r.samples for r in records.records) / records.sample_rate_hz
+    if total <= LONGEST_S:
+        return records, []
+    share = LONGEST_S / total
+    kept = [_first(record, max(int(share * record.samples), 1)) for record in records.records]
+    note = (
+        f"The records last {total:.0f} s; the first {100 * share:.0f} % of each are used, "
+        f"{LONGEST_S:.0f} s in all."
+    )
+    return replace(records, records=tuple(kept)), [note]
+
+
+def _first(record: Record, samples: int) -> Record:
+    reference, link = (
+        None if signal is None else signal[:samples] for signal in (record.reference, record.link)
+    )
+    return replace(
+        record,
+        reference=reference,
+        torque=record.torque[:samples],
+        position=record.position[:samples],
+        link=link,
+    )
+
+
+def _kept(fitter: CellFitter, found: Found, progress: Progress) -> tuple[Found, list[Tested]]:
+    """Take out, one at a time, the causes that do not pass the tests beside the others.
+
+    Where too little is held out, no cause is kept.
+    """
+    if len(fitter.evidence.parts_for("select")) < FEWEST_PARTS:
+        return replace(found, steps=found.steps[:1]), []
+    steps, tested = list(found.steps), []
+    while steps[-1].effects:
+        progress(f"tests of {' + '.join(steps[-1].effects)}")
+        tested = tested_causes(fitter, steps[-1], fitter.groups)
+        failed = [t for t in tested if not t.passed]
+        if not failed:
+            break
+        weakest = min(failed, key=lambda t: t.gain.mean)
+        before = [fit for fit in steps if weakest.effect not in fit.effects]
+        last = weakest.without
+        steps = before if last.effects == before[-1].effects else [*before, last]
+        same = last.effects == before[-1].effects
+        if same and fitter.gains(last, before[-1]).sum() > 0.0:
+            steps[-1] = last
+        tested = []
+    return replace(found, steps=steps), tested
+
+
+def _alternatives(
+    fitter: CellFitter, found: Found, tested: Tested, names: Sequence[str]
+) -> list[str]:
+    """Return the effects that do as well in place of a cause, all else fitted anew."""
+    best = found.best
+    tried = {*fx.near_equivalents(tested.effect), *found.alternatives.get(tested.effect, ())}
+    tied = []
+    for effect in sorted((tried & set(names)) - set(best.effects)):
+        proposals = fitter.screening(tested.without, effect).proposals()
+        other = fitter.add(tested.without, effect, proposals) if proposals else None
+        if other is None:
+            continue
+        if stands_for(gain(fitter, best, other), tested.gain.mean):
+            tied.append(effect)
+    return tied
+
+
+def _notes(evidence: Evidence, found: Found) -> list[str]:
+    notes = list(evidence.simulator.loop.notes)
+    if not evidence.noise.known:
+        notes.append(
+            "The noise of the position is not known: no repeats, no standstill, and the highest "
+            "lines are not flat; so nothing is said of significance."
+        )
+    if evidence.simulator.loop.kind == "unknown":
+        notes.append(
+            "The loop is not known, so the recorded torque drives the model and an observer of "
+            f"{evidence.simulator.crossover_hz:.3g} Hz holds it to the recorded position: below "
+            "that, errors show smaller than they are, and the figures of the torque are those of "
+            "what the observer adds."
+        )
+    if not found.complete:
+        notes.append(OUT_OF_TIME)
+    return notes

@@ -1,0 +1,353 @@
+"""The judgement on records: causes that are present, the gap step by step, and the remainder."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .model.evidence import Evidence
+from .model.simulated_rig import Model
+from .outcome.diagnosis import (
+    Candidate,
+    Cause,
+    Diagnosis,
+    EvidenceKind,
+    Figure,
+    Gap,
+    Gaps,
+    Place,
+    Remainder,
+    ReportedOn,
+    Stage,
+    Step,
+    Verdict,
+)
+from .where.remainder import looks_like
+from .which.cell_fits import CellFit, CellFitter
+from .which.presence import (
+    LEAST_INVARIANCE_P,
+    at_its_bound,
+    beyond_zero,
+    cell_estimates,
+    invariance,
+    where_it_acts,
+)
+from .which.stepwise import Found, Gain, gain
+
+NOTHING_LEFT = 2.0
+"""Mean squared error over noise below which noise explains what is left."""
+PLAIN = 4.0
+"""The same for the refit where no effect gains anything."""
+FEWEST_PARTS = 6
+"""Parts that select, below which the evidence is too thin for any name."""
+_DRAWS = 1000
+_MOST_PLACES = 4
+
+THIN = (
+    "The records are too short or too few to hold anything out of the fits, so nothing is named: "
+    "record more or longer runs."
+)
+
+
+@dataclass(frozen=True)
+class Tested:
+    """A cause and what its tests say.
+
+    Attributes:
+        effect: its identifier.
+        gain: what leaving it out loses on unseen parts.
+        without: the fit that lacks it.
+        invariance_p: see `invariance`; None with one level.
+        certain: whether the interval of its size lacks zero, and no parameter is at its bound.
+    """
+
+    effect: str
+    gain: Gain
+    without: CellFit
+    invariance_p: float | None
+    certain: bool
+
+    @property
+    def passed(self) -> bool:
+        """Whether the cause is called present."""
+        same = self.invariance_p is None or self.invariance_p >= LEAST_INVARIANCE_P
+        return self.gain.present and self.certain and same
+
+    @property
+    def present(self) -> float:
+        """Probability that it is there."""
+        sure = (1.0 - min(1.0, 5.0 * self.gain.p)) * min(1.0, self.gain.share + 0.1)
+        if not self.certain:
+            sure *= 0.5
+        if self.invariance_p is not None and self.invariance_p < LEAST_INVARIANCE_P:
+            sure *= 0.5
+        return min(sure, 0.99)
+
+
+def tested_causes(fitter: CellFitter, fit: CellFit, groups: np.ndarray) -> list[Tested]:
+    """Return every cause of a fit with its tests, all others fitted anew without it."""
+    estimates = cell_estimates(fit, groups)
+    found = []
+    for effect in fit.effects:
+        without = fitter.without(fit, effect)
+        found.append(
+            Tested(
+                effect,
+                gain(fitter, fit, without),
+                without,
+                invariance(fitter, fit, effect),
+                beyond_zero(effect, estimates) and not at_its_bound(fit, effect),
+            )
+        )
+    return found
+
+
+class Ledger:
+    """Figures of models on the parts that report."""
+
+    def __init__(self, evidence: Evidence) -> None:
+        """Take the evidence; the parts that select stand in where none reports."""
+        self.evidence = evidence
+        self.parts = evidence.reporting
+        self.runs = sorted({evidence.parts[p].record for p in self.parts})
+        self._part = evidence.part_of(self.parts)
+        energy = {
+            i: max(float(np.mean((r.position - r.position.mean()) ** 2)), 1e-300)
+            for i, r in enumerate(evidence.records.records)
+        }
+        of_part = np.array([energy[part.record] for part in evidence.parts])
+        self._scale = of_part[self._part] * evidence.hop
+        self._floor = evidence.floor(self.parts)[evidence.cell_of(self.parts)]
+
+    def squares(self, model: Model) -> np.ndarray:
+        """Return the squared error over the squared motion of each reporting part, (parts,)."""
+        errors = self.evidence.errors([model], self.parts)[0]
+        place = {part: k for k, part in enumerate(self.parts)}
+        part = np.array([place[p] for p in self._part])
+        windows = np.array([self.evidence.windows(p) for p in self.parts])
+        return np.bincount(part, errors**2 / self._scale) / windows
+
+    def step(self, model: Model, added: str | None, stage: Stage) -> Step:
+        """Return the gap of a model."""
+        evidence = self.evidence
+        errors = evidence.errors([model], self.parts)[0]
+        runs = evidence.simulator.run([model], self.runs)[0]
+        torque = [
+            float(np.mean((run[1] - r.torque) ** 2) / max(float(np.var(r.torque)), 1e-300))
+            for run, r in zip(runs, (evidence.records.records[i] for i in self.runs), strict=True)
+        ]
+        chi2 = float(np.mean(errors**2 / self._floor)) if evidence.noise.known else math.nan
+        return Step(
+            added=added,
+            stage=stage,
+            nrmse_position=float(np.sqrt(np.mean(self.squares(model)))),
+            nrmse_torque=float(np.sqrt(np.mean(torque))),
+            chi2_per_dof=chi2,
+        )
+
+    def noise(self) -> Gap | None:
+        """Return the gap that noise alone leaves; None where it is not known."""
+        evidence = self.evidence
+        if not evidence.noise.known:
+            return None
+        each = evidence.noise.std_rad**2 / self._scale
+        windows = sum(evidence.windows(p) for p in self.parts)
+        return Gap(
+            nrmse_position=float(np.sqrt(np.sum(each) / windows)),
+            nrmse_torque=None,
+            chi2_per_dof=1.0,
+        )
+
+    def places(self, sigma: np.ndarray) -> list[Place]:
+        """Return the strongest cells of (cells,) deviations as places."""
+        evidence = self.evidence
+        known = evidence.noise.known
+        order = np.argsort(-sigma)[:_MOST_PLACES]
+        found = []
+        for cell in order.tolist():
+            if not sigma[cell] > 1.0:
+                continue
+            level, band = divmod(cell, evidence.bands)
+            low, high = evidence.edges[band], evidence.edges[band + 1]
+            found.append(
+                Place(
+                    level=evidence.records.levels[level],
+                    band_hz=(float(low * evidence.line_hz), float(high * evidence.line_hz)),
+                    lines="slow" if band == 0 else "all",
+                    signal="position",
+                    sigma=float(sigma[cell]) if known else math.nan,
+                )
+            )
+        return found
+
+    def places_of_error(self, model: Model) -> list[Place]:
+        """Return where a model errs."""
+        errors = self.evidence.errors([model], self.parts)[0]
+        squares = self.evidence.mean_squares(errors, self.parts)
+        return self.places(np.sqrt(squares / self.evidence.floor(self.parts)))
+
+    def share(self, without: Model, best: Model, refit: Model) -> Figure:
+        """Return how much of what the refit left comes back without a cause, with its interval."""
+        lost = self.squares(without) - self.squares(best)
+        gap = self.squares(refit)
+        draws = np.random.default_rng(0).integers(0, gap.size, (_DRAWS, gap.size))
+        shares = lost[draws].sum(1) / np.maximum(gap[draws].sum(1), 1e-300)
+        low, high = np.quantile(shares, (0.025, 0.975))
+        one = gap.size < 2
+        return Figure(
+            value=float(lost.sum() / max(gap.sum(), 1e-300)),
+            low=math.nan if one else float(low),
+            high=math.nan if one else float(high),
+        )
+
+    def remainder(self, best: Model, refit: Model) -> Remainder:
+        """Return what a model leaves, and what that looks like."""
+        left, gap = self.squares(best), self.squares(refit)
+        evidence = self.evidence
+        records = [evidence.records.records[i] for i in self.runs]
+        missing = evidence.simulator.missing_torque(best, self.runs)
+        smooth = max(int(evidence.records.sample_rate_hz / (evidence.lines * evidence.line_hz)), 1)
+        finite = all(np.isfinite(m).all() for m in missing)
+        return Remainder(
+            nrmse_position=float(np.sqrt(left.mean())),
+            share=float(left.sum() / max(gap.sum(), 1e-300)),
+            looks_like=looks_like(records, missing, smooth) if finite else [],
+            where=self.places_of_error(best),
+        )
+
+
+def judge_records(
+    fitter: CellFitter,
+    nominal: Model,
+    found: Found,
+    tested: Sequence[Tested],
+    alternatives: dict[str, list[str]],
+    notes: Sequence[str],
+) -> Diagnosis:
+    """Return the diagnosis of records whose search has ended.
+
+    Args:
+        fitter: of the search.
+        nominal: the datasheet's model.
+        found: the steps of the search; its last fit holds the causes that are kept.
+        tested: these causes with their tests.
+        alternatives: for each of them what does as well in its place.
+        notes: sentences on the records.
+    """
+    evidence, best, refit = fitter.evidence, found.best, found.steps[0]
+    ledger = Ledger(evidence)
+    thin = len(evidence.parts_for("select")) < FEWEST_PARTS
+    estimates = cell_estimates(best, fitter.groups)
+    causes = [] if thin else [_cause(t, fitter, ledger, found, alternatives) for t in tested]
+    causes.sort(key=lambda c: -(c.share.value if c.share else 0.0))
+    steps = [
+        ledger.step(nominal, None, "nominal"),
+        ledger.step(refit.model, None, "refit"),
+        *(ledger.step(fit.model, fit.effects[-1], "cause") for fit in found.steps[1:]),
+    ]
+    verdict = _verdict(causes, steps, evidence, thin)
+    ends = {"nominal": steps[0], "refit": steps[1], "explained": steps[-1]}
+    gaps = {
+        name: Gap(
+            nrmse_position=s.nrmse_position,
+            nrmse_torque=s.nrmse_torque,
+            chi2_per_dof=s.chi2_per_dof,
+        )
+        for name, s in ends.items()
+    }
+    return Diagnosis(
+        verdict=verdict,
+        effects=[cause.effect for cause in causes],
+        equivalent=[[cause.effect, *cause.others] for cause in causes],
+        confidence=min((c.present for c in causes), default=0.5),
+        evidence=EvidenceKind(
+            noise=evidence.noise.source,
+            reported_on=_reported_on(evidence),
+            controller=evidence.simulator.loop.kind,
+            excitation="record",
+        ),
+        causes=causes,
+        steps=steps,
+        remainder=ledger.remainder(best.model, refit.model),
+        gap=Gaps(**gaps, noise_floor=ledger.noise()),
+        gap_closed=_closed(ledger, refit.model, best.model) if causes else None,
+        where=ledger.places_of_error(refit.model),
+        ranking=_ranking(fitter, found),
+        parameters=estimates,
+        notes=[*([THIN] if thin else []), *notes],
+    )
+
+
+def _closed(ledger: Ledger, refit: Model, best: Model) -> float:
+    return 1.0 - float(ledger.squares(best).sum() / max(ledger.squares(refit).sum(), 1e-300))
+
+
+def _cause(
+    tested: Tested,
+    fitter: CellFitter,
+    ledger: Ledger,
+    found: Found,
+    alternatives: dict[str, list[str]],
+) -> Cause:
+    best = found.best
+    estimates = cell_estimates(best, fitter.groups)
+    parameters = {n: e for n, e in estimates.items() if n.startswith(f"{tested.effect}.")}
+    moved = where_it_acts(fitter, best, tested.without, ledger.parts)
+    return Cause(
+        effect=tested.effect,
+        others=alternatives.get(tested.effect, []),
+        present=tested.present,
+        share=ledger.share(tested.without.model, best.model, found.steps[0].model),
+        invariance_p=tested.invariance_p,
+        where=ledger.places(moved),
+        parameters=parameters,
+    )
+
+
+def _reported_on(evidence: Evidence) -> ReportedOn:
+    if not evidence.parts_for("report"):
+        return "none"
+    fitted = {evidence.parts[p].record for p in evidence.parts_for("fit")}
+    reported = {evidence.parts[p].record for p in evidence.parts_for("report")}
+    return "blocks" if fitted & reported else "records"
+
+
+def _verdict(
+    causes: Sequence[Cause], steps: Sequence[Step], evidence: Evidence, thin: bool
+) -> Verdict:
+    known = evidence.noise.known
+    left = steps[-1].chi2_per_dof
+    if causes:
+        if known and left is not None and left < NOTHING_LEFT:
+            return "ambiguous" if any(cause.others for cause in causes) else "effect"
+        return "partly_explained"
+    if known and not thin:
+        if steps[0].chi2_per_dof is not None and steps[0].chi2_per_dof < NOTHING_LEFT:
+            return "no_gap"
+        if steps[1].chi2_per_dof is not None and steps[1].chi2_per_dof < PLAIN:
+            return "parameters_only"
+    return "unexplained"
+
+
+def _ranking(fitter: CellFitter, found: Found) -> list[Candidate]:
+    ranked = []
+    for count, fits in found.rivals.items():
+        parent = found.steps[min(count, len(found.steps)) - 1]
+        for fit in fits:
+            names = [n for n in fit.space.effects]
+            ranked.append(
+                Candidate(
+                    effects=list(fit.effects),
+                    held_out_chi2=None,
+                    delta=gain(fitter, fit, parent).mean,
+                    converged=fit.solution.converged,
+                    parameters={
+                        n: {"value": fit.model.effects[n], "low": math.nan, "high": math.nan}
+                        for n in names
+                    },
+                )
+            )
+    return ranked

@@ -1,0 +1,48 @@
+"""What every report of a diagnosis shows, of steady periods or of records: common values."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+from ..model.simulated_rig import Model
+from ..outcome.cause_words import evidence_sentences, remainder_sentences
+from ..outcome.diagnosis import Diagnosis
+from ..outcome.verdict_words import HELD_OUT, WORDS, closed, headline, meaning, summaries
+from .gap_tables import causes
+from .waterfall import height, waterfall_plot
+
+
+def outcome_values(diagnosis: Diagnosis) -> dict[str, Any]:
+    """Return the values of `gap_page.html`, but for lead and plots."""
+    return {
+        "diagnosis": diagnosis,
+        "good": diagnosis.verdict in ("no_gap", "parameters_only", "effect"),
+        "headline": headline(diagnosis),
+        "meaning": meaning(diagnosis),
+        "closed": closed(diagnosis),
+        "words": WORDS[diagnosis.verdict],
+        "summaries": summaries(diagnosis),
+        "data": HELD_OUT[diagnosis.reported_on],
+        "waterfall_px": height(diagnosis) if waterfall_plot(diagnosis) else 0,
+        "causes": causes(diagnosis),
+        "tested_causes": any(cause.where for cause in diagnosis.causes),
+        "remainder": remainder_sentences(diagnosis),
+        "evidence": evidence_sentences(diagnosis.evidence) if diagnosis.evidence else [],
+    }
+
+
+def outcome_plots(diagnosis: Diagnosis) -> dict[str, Any]:
+    """Return the plots of `gap_page.html` by their places."""
+    plot = waterfall_plot(diagnosis)
+    return {} if plot is None else {"waterfall": plot}
+
+
+def origin(
+    source: str, controller: dict | None, nominal: Model, provenance: Mapping[str, str]
+) -> dict[str, str]:
+    """Return where the numbers come from, by name: folder, versions, nominal, controller."""
+    values = ", ".join(f"{k} {v:.6g}" for k, v in nominal.plant.items())
+    described = json.dumps(controller, default=str)
+    return {"folder": source, **provenance, "nominal": values, "controller": described}

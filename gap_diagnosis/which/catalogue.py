@@ -1,0 +1,36 @@
+"""The effects that are looked for on a rig."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from fjr_kit.errors import InputError
+from fjr_sim_node import effects as fx
+
+from .search_space import possible_effects
+
+
+def catalogue(nominal: Mapping[str, float], asked: Sequence[str] | None = None) -> list[str]:
+    """Return the effects that a rig can have, or those of them that were asked for.
+
+    A rigid axis has none of transmission and link, and friction is added only where there is none.
+
+    Args:
+        nominal: datasheet values of the base parameters.
+        asked: identifiers; None for all.
+
+    Raises:
+        InputError: an identifier of no effect, or none that this rig can have.
+    """
+    for name in asked or ():
+        if name not in fx.EFFECTS:
+            raise InputError(
+                f"effects: {name} is no effect; the effects are {', '.join(fx.EFFECTS)}."
+            )
+    found = [e for e in possible_effects(nominal) if asked is None or e in asked]
+    if asked is not None and not found:
+        raise InputError(
+            f"effects: none of {', '.join(asked) or 'the named effects'} can be fitted to this "
+            "rig; name others, or none for all."
+        )
+    return found

@@ -1,0 +1,216 @@
+"""Fits beside a remainder: the variance of each cell is what the model itself leaves there.
+
+No model of a real rig leaves noise alone. So the weight of a cell of the evidence is not that of
+noise: it is estimated from what the fit leaves on the fitted parts, and the fit is repeated with it
+(iteratively reweighted least squares, the maximum-likelihood estimate for unknown variances by
+cell). Models are compared by the log-likelihood of parts that no fit has seen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from fjr_sim_node import effects as fx
+
+from ..model.evidence import Evidence
+from ..model.simulated_rig import Model
+from .least_squares import Solution, solve
+from .ripples_of_records import RecordRipples
+from .scales import Scales
+from .screening import Proposal, Screening
+from .search_space import Space, space_for, starts
+
+_REFIT_ROUNDS = (8, 5, 5)
+_ADDED_ROUNDS = (6, 4)
+_NO_PROMISE = 0.998  # of the parent's cost: a start that gains less is not pursued
+_STARTS = 2
+RIPPLES_TRIED = 3
+_RIVAL = 1.05  # a second start that costs more than this times the first is not pursued
+
+
+@dataclass(frozen=True)
+class CellFit:
+    """One explanation after fitting.
+
+    Attributes:
+        effects: identifiers in the order in which they were added.
+        space: what was free.
+        model: the fitted model.
+        solution: the optimiser's end, its residuals in standard deviations of `variance`.
+        variance: (cells,), of an error in each cell, rad2.
+        left: (parts, bands), mean square of what is left on each part that selects, noise and the
+            simulation's own error added, rad2.
+    """
+
+    effects: tuple[str, ...]
+    space: Space
+    model: Model
+    solution: Solution
+    variance: np.ndarray
+    left: np.ndarray
+
+
+class CellFitter:
+    """Fits explanations to the evidence of records.
+
+    Attributes:
+        evidence: the records.
+        nominal: datasheet values of the base parameters.
+        tolerance: how far one may be off, relative.
+        fit_parts, select_parts: indices of parts.
+    """
+
+    def __init__(self, evidence: Evidence, nominal: Mapping[str, float], tolerance: float) -> None:
+        """Prepare."""
+        self.evidence, self.nominal, self.tolerance = evidence, dict(nominal), tolerance
+        self.fit_parts = evidence.parts_for("fit")
+        self.select_parts = evidence.parts_for("select") or self.fit_parts
+        self._rippled: tuple[CellFit, RecordRipples] | None = None
+        self._cell = evidence.cell_of(self.fit_parts)
+        self._floor = evidence.floor(self.fit_parts)
+        self.groups = evidence.part_of(self.fit_parts)
+        evidence = self.evidence
+        bands = evidence.cell_of(self.select_parts) % evidence.bands
+        place = {part: k for k, part in enumerate(self.select_parts)}
+        of_part = np.array([place[p] for p in evidence.part_of(self.select_parts)])
+        self._select_bins = of_part * evidence.bands + bands
+        shape = len(self.select_parts), evidence.bands
+        self._counts = np.bincount(self._select_bins, minlength=shape[0] * shape[1]).reshape(shape)
+        levels = [evidence.records.levels.index(evidence.parts[p].level) for p in self.select_parts]
+        self._select_floor = self._floor.reshape(-1, evidence.bands)[levels]
+        records = evidence.records
+        self.scales = Scales.of_record(
+            [r.position for r in records.records],
+            [r.torque for r in records.records],
+            records.sample_rate_hz,
+            evidence.lines * evidence.line_hz,
+            self.nominal,
+        )
+
+    def refit(self) -> CellFit:
+        """Fit the base parameters alone, from the datasheet."""
+        space = Space(self.nominal, (), (), self.tolerance, self.scales)
+        start = space.point(Model(self.nominal, {}))
+        errors = self.evidence.errors([space.model(start)], self.fit_parts)[0]
+        return self._reweighted((), space, start, self._variance(errors), _REFIT_ROUNDS)
+
+    def screening(self, parent: CellFit, effect: str) -> Screening:
+        """Return what the starts of an effect promise beside a fit."""
+        cycles = None
+        if fx.EFFECTS[effect].ripple:
+            cycles = self._ripples(parent).cycles(effect, self.scales.cycles(), RIPPLES_TRIED)
+        return Screening(
+            parent.solution,
+            parent.model,
+            starts(effect, self.scales, cycles, self.nominal),
+            partial(self._space, parent),
+            partial(self._residuals, parent.variance),
+        )
+
+    def add(self, parent: CellFit, effect: str, proposals: Sequence[Proposal]) -> CellFit | None:
+        """Fit a parent's explanation with one effect more; None if no start promises anything."""
+        best: CellFit | None = None
+        kept: list[Space] = []
+        for cost, space, point in proposals:
+            if cost > _NO_PROMISE * parent.solution.cost or len(kept) == _STARTS:
+                break
+            if cost > _RIVAL * proposals[0][0]:
+                break
+            if any(space is one for one in kept):
+                continue
+            kept.append(space)
+            known = parent.solution.jacobian if len(kept) == 1 else None
+            fit = self._reweighted(
+                (*parent.effects, effect), space, point, parent.variance, _ADDED_ROUNDS, known
+            )
+            if best is None or self.gains(fit, best).sum() > 0.0:
+                best = fit
+        return best
+
+    def without(self, fit: CellFit, effect: str) -> CellFit:
+        """Return a fit with one effect taken out and all else fitted anew."""
+        names = tuple(n for n in fit.space.effects if not n.startswith(f"{effect}."))
+        units = tuple(
+            u for n, u in zip(fit.space.effects, fit.space.units, strict=True) if n in names
+        )
+        space = replace(fit.space, effects=names, units=units)
+        start = space.point(fit.model)
+        rest = tuple(e for e in fit.effects if e != effect)
+        return self._reweighted(rest, space, start, fit.variance, _ADDED_ROUNDS)
+
+    def gains(self, after: CellFit, before: CellFit) -> np.ndarray:
+        """Return the log-likelihood that one fit gains over another on each part that selects.
+
+        With the variance of each band of each part unknown it is n/2 ln(left before/left after),
+        summed over bands of n numbers: no part counts by its size, and no outlier by its square.
+
+        Returns:
+            (parts,), nats.
+        """
+        counts = self._counts
+        return 0.5 * np.sum(counts * np.log(before.left / after.left), axis=1)
+
+    def _left(self, model: Model) -> np.ndarray:
+        parts = self.select_parts
+        errors = self.evidence.errors([model], parts)[0]
+        bins = self._select_bins
+        squares = np.bincount(bins, errors**2, len(parts) * self.evidence.bands)
+        mean = squares.reshape(len(parts), -1) / self._counts
+        return mean + self._select_floor
+
+    def _ripples(self, parent: CellFit) -> RecordRipples:
+        if self._rippled is None or self._rippled[0] is not parent:
+            weight = 1.0 / np.sqrt(parent.variance[self._cell])
+            solution = parent.solution
+            ripples = RecordRipples(self.evidence, self.fit_parts, parent.model, weight, solution)
+            self._rippled = parent, ripples
+        return self._rippled[1]
+
+    def _space(self, parent: CellFit, seed: Mapping[str, float]) -> Space:
+        added = space_for(self.nominal, seed, self.scales, self.tolerance)
+        return replace(
+            parent.space,
+            effects=parent.space.effects + added.effects,
+            units=parent.space.units + added.units,
+        )
+
+    def _residuals(self, variance: np.ndarray, models: Sequence[Model]) -> np.ndarray:
+        return self.evidence.errors(models, self.fit_parts) / np.sqrt(variance[self._cell])
+
+    def _variance(self, errors: np.ndarray) -> np.ndarray:
+        found = self.evidence.mean_squares(errors, self.fit_parts)
+        return np.maximum(found, self._floor)
+
+    def _reweighted(
+        self,
+        effects: tuple[str, ...],
+        space: Space,
+        start: np.ndarray,
+        variance: np.ndarray,
+        rounds: Sequence[int],
+        known: np.ndarray | None = None,
+    ) -> CellFit:
+        x, solution = start, None
+        for steps in rounds:
+
+            def residuals(points: np.ndarray, variance: np.ndarray = variance) -> np.ndarray:
+                return self._residuals(variance, [space.model(point) for point in points])
+
+            solution = solve(residuals, x, *space.bounds(), most_steps=steps, known=known)
+            errors = solution.residuals * np.sqrt(variance[self._cell])
+            before, variance, x = variance, self._variance(errors), solution.x
+            change = np.sqrt(before / variance)[self._cell]
+            known = solution.jacobian * change[:, None]
+        assert solution is not None and known is not None
+        ended = replace(
+            solution,
+            residuals=errors / np.sqrt(variance[self._cell]),
+            jacobian=known,
+            cost=float(np.sum(errors**2 / variance[self._cell])),
+        )
+        model = space.model(x)
+        return CellFit(effects, space, model, ended, variance, self._left(model))

@@ -1,0 +1,23 @@
+"""Effects that may stand in for each other, and those that only scale the base parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from fjr_sim_node import effects as fx
+
+SCALES = tuple(effect.identifier for effect in fx.CATALOGUE if effect.scales)
+"""Effects that scale the base parameters: a gain of the torque does nothing else, and is no second
+cause whatever it gains; an eccentric encoder has a gain about its zero, and may do more."""
+
+
+def partners(found: Sequence[str], among: set[str]) -> list[str]:
+    """Return the near equivalents of effects, so that a set is never short of one not tried."""
+    alike = {other for effect in found for other in fx.near_equivalents(effect)} | set(found)
+    return sorted(among & alike)
+
+
+def stands_for(effects: Sequence[str], others: Sequence[str]) -> bool:
+    """Tell whether explanations differ by one effect and a near equivalent of it."""
+    mine, theirs = set(effects) - set(others), set(others) - set(effects)
+    return len(mine) == 1 and bool(partners(sorted(theirs), mine))

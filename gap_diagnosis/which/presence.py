@@ -1,0 +1,137 @@
+"""Tests of presence: is a cause there, the same at all levels, and by how much?
+
+A substitute for another effect can lower the misfit of one level; its value moves when the
+amplitude changes, and a true cause keeps its value (invariant causal prediction: Peters, Buehlmann,
+Meinshausen 2016, JRSS-B 78(5)).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from scipy import stats
+
+from fjr_sim_node import effects as fx
+
+from ..outcome.diagnosis import Estimate
+from .cell_fits import CellFit, CellFitter
+from .estimates import standard_errors
+
+LEAST_INVARIANCE_P = 0.01
+_SAME = 0.05  # relative: sizes that differ by no more are the same, since friction scatters
+_NORMAL_95 = 1.96
+_AT_BOUND = 1e-3  # relative
+
+
+def cell_estimates(fit: CellFit, groups: np.ndarray) -> dict[str, Estimate]:
+    """Return all free parameters with their 95 % intervals, cut at their bounds.
+
+    Args:
+        fit: an explanation.
+        groups: to which part each of its errors belongs.
+    """
+    solution, space = fit.solution, fit.space
+    std = standard_errors(solution.jacobian, solution.residuals, groups)
+    ends = [np.clip(solution.x + sign * _NORMAL_95 * std, *space.bounds()) for sign in (-1, 1)]
+    low, high = (space.model(end) for end in ends)
+    found = {
+        name: Estimate(value=fit.model.plant[name], low=low.plant[name], high=high.plant[name])
+        for name in space.nominal
+    }
+    for name in space.effects:
+        found[name] = Estimate(
+            value=fit.model.effects[name], low=low.effects[name], high=high.effects[name]
+        )
+    return found
+
+
+def beyond_zero(effect: str, found: dict[str, Estimate]) -> bool:
+    """Tell whether the interval of one of an effect's sizes lacks the value that means off."""
+    for name in fx.EFFECTS[effect].size_names:
+        if name not in found:
+            continue
+        estimate, off = found[name], float(fx.parameter(name).default)
+        if math.isinf(off) or not estimate.low <= off <= estimate.high:
+            return True
+    return False
+
+
+def at_its_bound(fit: CellFit, effect: str) -> bool:
+    """Tell whether a parameter of an effect lies where the fit may go no further.
+
+    Zero and one are no such bounds: they are what a ratio or a share can be.
+    """
+    low, high = fit.space.bounds()
+    for k, name in enumerate(fit.space.effects, len(fit.space.nominal)):
+        if not name.startswith(f"{effect}.") or fx.parameter(name).role == "angle":
+            continue
+        unit = fit.space.units[k - len(fit.space.nominal)]
+        for end in (low[k], high[k]):
+            near = abs(fit.solution.x[k] - end) <= _AT_BOUND * max(abs(end), _AT_BOUND)
+            if near and end * unit not in (0.0, 1.0):
+                return True
+    return False
+
+
+def invariance(fitter: CellFitter, fit: CellFit, effect: str) -> float | None:
+    """Return how often chance makes an effect's size differ so much between levels.
+
+    The sizes are free at each level while all else is common, to first order; their covariance is
+    robust to what is alike within a part (sandwich estimate by clusters).
+
+    Returns:
+        p-value of the Wald test that they are equal; None with one level.
+    """
+    evidence = fitter.evidence
+    level = np.array([evidence.parts[p].level for p in fitter.groups])
+    levels = np.unique(level)
+    columns = [
+        len(fit.space.nominal) + k
+        for k, name in enumerate(fit.space.effects)
+        if name.startswith(f"{effect}.") and fx.parameter(name).role in ("size", "limit")
+    ]
+    if levels.size < 2 or not columns:
+        return None
+    least = 1.0
+    for column in columns:
+        p = _equal(fit, column, level, levels, fitter.groups)
+        if p is not None:
+            least = min(least, p * len(columns))
+    return min(least, 1.0)
+
+
+def _equal(
+    fit: CellFit, column: int, level: np.ndarray, levels: np.ndarray, groups: np.ndarray
+) -> float | None:
+    jacobian, residuals = fit.solution.jacobian, fit.solution.residuals
+    own = jacobian[:, column]
+    if not own.any():
+        return None
+    split = own[:, None] * (level[:, None] == levels)
+    common = np.delete(jacobian, column, axis=1)
+    wide = np.concatenate([split, common], axis=1)
+    inverse = np.linalg.pinv(wide.T @ wide, rcond=1e-12)
+    step = -inverse @ (wide.T @ residuals)
+    left = residuals + wide @ step
+    scores = np.array([wide[groups == g].T @ left[groups == g] for g in np.unique(groups)])
+    count = len(scores)
+    covariance = count / max(count - 1, 1) * inverse @ (scores.T @ scores) @ inverse
+    k = levels.size
+    values = fit.solution.x[column] + step[:k]
+    spread = covariance[:k, :k] + np.diag(np.full(k, (_SAME * fit.solution.x[column]) ** 2))
+    contrast = np.eye(k)[1:] - np.eye(k)[:1]
+    difference = contrast @ values
+    statistic = float(difference @ np.linalg.pinv(contrast @ spread @ contrast.T) @ difference)
+    return float(stats.chi2.sf(statistic, k - 1))
+
+
+def where_it_acts(
+    fitter: CellFitter, fit: CellFit, without: CellFit, parts: Sequence[int]
+) -> np.ndarray:
+    """Return how many standard deviations of noise a cause moves each cell, (cells,)."""
+    evidence = fitter.evidence
+    errors = evidence.errors([fit.model, without.model], parts)
+    moved = evidence.mean_squares(errors[1] - errors[0], parts)
+    return np.sqrt(moved / evidence.floor(parts))

@@ -1,0 +1,149 @@
+"""What is usual in a record: the measures of all starts and bounds of fits.
+
+The table of effects gives both relative to these scales; which one a parameter takes follows from
+its unit and from the part that its effect acts on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fjr_records.recorded import RecordedExperiment
+from fjr_sim_node import effects as fx
+
+_QUARTER_CYCLE = 0.2  # rad of rms motion: about a quarter of what is then travelled to and fro
+_FINE, _COARSE = 0.065, 0.5  # rad of rms motion from one number of ripples to the next
+_MOST_CYCLES = 400
+
+
+@dataclass(frozen=True)
+class Scales:
+    """What is usual in a record: the measures of all starts and bounds of fits.
+
+    Attributes:
+        torque_nm: rms torque.
+        velocity_rad_s: rms velocity.
+        angle_rad: rms of the motion about its mean.
+        deflection_rad: rms torque over k0; the rms motion on a rigid axis.
+        period_s: sample period.
+        band_hz: highest frequency with signal.
+        inertia_kg_m2: motor and link together.
+        peak_torque_nm: greatest torque; a drive that saturates does so below it, and far below
+            where the loop then asks for more.
+    """
+
+    torque_nm: float
+    velocity_rad_s: float
+    angle_rad: float
+    deflection_rad: float
+    period_s: float
+    band_hz: float
+    inertia_kg_m2: float
+    peak_torque_nm: float
+
+    @classmethod
+    def of_record(
+        cls,
+        positions: Sequence[np.ndarray],
+        torques: Sequence[np.ndarray],
+        sample_rate_hz: float,
+        band_hz: float,
+        nominal: Mapping[str, float],
+    ) -> Scales:
+        """Return the scales of a record.
+
+        Args:
+            positions: y of each run, float64 (samples,), rad.
+            torques: u of each run, float64 (samples,), N m.
+            sample_rate_hz: rate of the samples.
+            band_hz: highest frequency with signal.
+            nominal: bare parameters; a rigid axis has no k0.
+        """
+        span = max(round(sample_rate_hz / (4.0 * band_hz)), 1)
+        speeds = [(y[span:] - y[:-span]) * (sample_rate_hz / span) for y in positions]
+        torque, angle = _rms(torques), _rms([y - y.mean() for y in positions])
+        return cls(
+            torque_nm=torque,
+            velocity_rad_s=_rms(speeds),
+            angle_rad=angle,
+            deflection_rad=torque / nominal["k0"] if nominal.get("k0") else angle,
+            period_s=1.0 / sample_rate_hz,
+            band_hz=band_hz,
+            inertia_kg_m2=nominal["jm"] + nominal.get("j", 0.0),
+            peak_torque_nm=max(float(np.abs(u).max()) for u in torques) or 1.0,
+        )
+
+    @classmethod
+    def of_experiment(cls, recorded: RecordedExperiment, nominal: Mapping[str, float]) -> Scales:
+        """Return the scales of a periodic experiment; its lines end where the signal does."""
+        description = recorded.experiment
+        rate = description.sample_rate_hz
+        return cls.of_record(
+            [r.position.ravel() for r in recorded.realizations],
+            [r.torque.ravel() for r in recorded.realizations],
+            rate,
+            (recorded.lines - 1) * rate / description.samples_per_period,
+            nominal,
+        )
+
+    def of(self, name: str) -> float:
+        """Return the scale of a parameter, by its full name, in the parameter's unit."""
+        parameter = fx.parameter(name)
+        if parameter.absolute or parameter.role in ("angle", "cycles"):
+            return 1.0
+        if parameter.role == "limit":
+            return {
+                "N m": self.peak_torque_nm,
+                "N m/s": self.peak_torque_nm / self.period_s,
+                "N m/rad": self.torque_nm / self.angle_rad,
+            }[parameter.unit]
+        inner = fx.EFFECTS[name.split(".", 1)[0]].acts_on == "transmission"
+        return {
+            "": 1.0,
+            "N m": self.torque_nm,
+            "N m s/rad": self.torque_nm / self.velocity_rad_s,
+            "N m s2/rad2": self.torque_nm / self.velocity_rad_s**2,
+            "rad": self.deflection_rad if inner else self.angle_rad,
+            "rad/N m": self.angle_rad / self.torque_nm,
+            "rad/s": self.velocity_rad_s,
+            "s": self.period_s,
+            "1/s": 1.0 / self.period_s,
+            "Hz": self.band_hz,
+            "kg m2": self.inertia_kg_m2,
+        }[parameter.unit]
+
+    def bounds(self, name: str) -> tuple[float, float]:
+        """Return the least and the greatest value that a fit may give a parameter."""
+        parameter = fx.parameter(name)
+        if parameter.role == "cycles":
+            tried = self.cycles()
+            return max(0.6 * float(tried[0]), parameter.low), 1.1 * float(tried[-1])
+        return parameter.fit_bounds(self.of(name))
+
+    def negligible(self, name: str) -> float:
+        """Return the size of a parameter below which its effect counts as off."""
+        return fx.parameter(name).negligible * self.of(name)
+
+    def cycles(self) -> np.ndarray:
+        """Return the numbers of ripples per turn that the motion can show, ascending.
+
+        From about a quarter of a ripple over what is travelled to and fro, to three samples in a
+        ripple at the rms velocity. Neighbours are as near as a fit can bridge; beyond what that
+        allows whole numbers follow, as the poles and slots of motors have.
+        """
+        low = max(_QUARTER_CYCLE / self.angle_rad, 0.02)
+        high = 2.0 * np.pi / (3.0 * self.period_s * self.velocity_rad_s)
+        high = float(np.clip(high, 4.0 * low, 9e3))
+        step = max((high - low) / _MOST_CYCLES, _FINE / self.angle_rad)
+        step = min(step, _COARSE / self.angle_rad)
+        near = low + step * np.arange(min(_MOST_CYCLES, int((high - low) / step) + 1))
+        whole = np.arange(np.ceil(near[-1]) + 1.0, high)[:_MOST_CYCLES]
+        return np.concatenate([near, whole])
+
+
+def _rms(signals: Sequence[np.ndarray]) -> float:
+    """Return the rms over all signals, 1 if they are zero."""
+    return float(np.sqrt(np.mean(np.concatenate([s.ravel() for s in signals]) ** 2))) or 1.0

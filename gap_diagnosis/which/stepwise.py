@@ -1,0 +1,200 @@
+"""Causes beside a remainder: one after the other, each kept only if unseen parts call for it.
+
+An effect is added if it raises the log-likelihood of nearly all parts that no fit has seen, by more
+than these parts differ; an effect that the others can do without is taken out again.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy import stats
+
+from fjr_sim_node import effects as fx
+
+from .cell_fits import CellFit, CellFitter
+
+MOST_CAUSES = 4
+_PROPOSED, _FITTED = 6, 4
+LEAST_GAIN = 1.0
+"""Least mean gain of log-likelihood of an unseen part (nats)."""
+LEAST_SHARE = 0.75
+"""Least share of the parts in which anything changes that must gain."""
+MOST_P = 0.02
+"""Greatest p-value of the signed-rank test that parts gain as often and as much as they lose."""
+TIED_SHARE = 0.15
+"""An effect stands for another if it is behind by less than this share of the other's gain..."""
+TIED_P = 0.1
+"""...or by less than half of it and unseen parts do not show the difference."""
+
+_MUCH_LESS = 0.3  # of the greatest gain: a cause that gains less waits for the next step
+_NEUTRAL = 0.02  # of the greatest gain of a part: parts that change by less say nothing
+
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Gain:
+    """What one explanation gains over another on unseen parts.
+
+    Attributes:
+        mean: mean over unseen parts of the log-likelihood gained (nats).
+        without_best: the same without the part that gains most.
+        share: share of parts that gain, of those in which anything changes.
+        p: p-value of Wilcoxon's signed-rank test against no gain.
+    """
+
+    mean: float
+    without_best: float
+    share: float
+    p: float
+
+    @property
+    def present(self) -> bool:
+        """Whether it repeats, and is not the sum by one part."""
+        repeats = self.share >= LEAST_SHARE and self.p <= MOST_P
+        return min(self.mean, 3.0 * self.without_best) > LEAST_GAIN and repeats
+
+
+def gain(fitter: CellFitter, after: CellFit, before: CellFit) -> Gain:
+    """Return what `after` gains over `before` on the parts that select."""
+    difference = fitter.gains(after, before)
+    if difference.size < 2 or not difference.any():
+        return Gain(float(difference.mean()), 0.0, 0.0, 1.0)
+    most = int(np.argmax(difference))
+    telling = difference[np.abs(difference) >= _NEUTRAL * np.abs(difference).max()]
+    return Gain(
+        float(difference.mean()),
+        float(np.delete(difference, most).mean()),
+        float(np.mean(telling > 0.0)),
+        float(stats.wilcoxon(difference, alternative="greater").pvalue),
+    )
+
+
+@dataclass
+class Found:
+    """What the stepwise search found.
+
+    Attributes:
+        steps: the refit, then one fit for each cause that was added.
+        rivals: fits that were tried at each step, by the number of causes.
+        alternatives: for each cause what does as well in its place.
+        complete: whether the search ended by itself, not by its budget.
+    """
+
+    steps: list[CellFit]
+    rivals: dict[int, list[CellFit]] = field(default_factory=dict)
+    alternatives: dict[str, list[str]] = field(default_factory=dict)
+    complete: bool = True
+
+    @property
+    def best(self) -> CellFit:
+        """The last step."""
+        return self.steps[-1]
+
+
+class Stepwise:
+    """The search over causes of one set of records."""
+
+    def __init__(
+        self,
+        fitter: CellFitter,
+        effects: Sequence[str],
+        progress: Progress = lambda _: None,
+        until: float = float("inf"),
+    ) -> None:
+        """Take what to search.
+
+        Args:
+            fitter: fits explanations.
+            effects: identifiers to try.
+            progress: told what is tried.
+            until: instant of `time.monotonic` after which nothing new is begun.
+        """
+        self._fitter, self._effects, self._progress, self._until = fitter, effects, progress, until
+
+    def run(self) -> Found:
+        """Search forward, then drop what is not needed."""
+        self._progress("refit of the base parameters")
+        found = Found([self._fitter.refit()])
+        while len(found.best.effects) < MOST_CAUSES:
+            if self._over:
+                found.complete = False
+                break
+            fits = self._extended(found.best)
+            found.rivals[len(found.best.effects) + 1] = fits
+            chosen = self._chosen(fits, found.best)
+            if chosen is None:
+                break
+            found.alternatives[chosen.effects[-1]] = self._tied(chosen, fits, found.best)
+            found.steps.append(chosen)
+        return found
+
+    @property
+    def _over(self) -> bool:
+        return time.monotonic() > self._until
+
+    def _extended(self, parent: CellFit) -> list[CellFit]:
+        """Return the parent with each promising effect more, best on unseen parts first."""
+        effects = [e for e in self._effects if e not in parent.effects]
+        screened = {}
+        for effect in effects:
+            self._progress(f"{' + '.join((*parent.effects, effect))}, screened")
+            screened[effect] = self._fitter.screening(parent, effect)
+        hopeful = sorted(effects, key=lambda e: -screened[e].gain)[:_PROPOSED]
+        proposals = {e: screened[e].proposals() for e in hopeful}
+        ordered = sorted((e for e in hopeful if proposals[e]), key=lambda e: proposals[e][0][0])
+        chosen = ordered[:_FITTED]
+        alike = {p for e in chosen[:2] for p in fx.near_equivalents(e)} & set(effects)
+        for effect in sorted(alike - set(chosen)):
+            proposals.setdefault(effect, screened[effect].proposals())
+            chosen.append(effect)
+        fits = []
+        for number, effect in enumerate(chosen, 1):
+            self._progress(f"{' + '.join((*parent.effects, effect))} ({number} of {len(chosen)})")
+            fit = self._fitter.add(parent, effect, proposals[effect])
+            if fit is not None:
+                fits.append(fit)
+        return sorted(fits, key=lambda fit: -self._gain(fit, parent).mean)
+
+    def _gain(self, after: CellFit, before: CellFit) -> Gain:
+        return gain(self._fitter, after, before)
+
+    def _chosen(self, fits: Sequence[CellFit], parent: CellFit) -> CellFit | None:
+        """Return the best fit whose gain repeats, unless another one gains much more.
+
+        Of those that unseen parts cannot tell from it, the one with the fewest parameters.
+        """
+        gains = [self._gain(fit, parent) for fit in fits]
+        repeating = [
+            fit
+            for fit, found in zip(fits, gains, strict=True)
+            if found.present and found.mean > _MUCH_LESS * gains[0].mean
+        ]
+        if not repeating:
+            return None
+        first = repeating[0]
+        worth = self._gain(first, parent).mean
+        alike = [f for f in repeating if f is first or stands_for(self._gain(first, f), worth)]
+        return min(alike, key=lambda fit: len(fit.space.effects))
+
+    def _tied(self, chosen: CellFit, fits: Sequence[CellFit], parent: CellFit) -> list[str]:
+        """Return the effects that unseen parts cannot tell from the chosen one."""
+        first = self._gain(chosen, parent).mean
+        others = [fit for fit in fits if fit is not chosen]
+        return [f.effects[-1] for f in others if stands_for(self._gain(chosen, f), first)]
+
+
+def stands_for(behind: Gain, first: float) -> bool:
+    """Tell whether unseen parts cannot tell an explanation from a better one.
+
+    Args:
+        behind: what the better one gains over it.
+        first: mean gain of the better one's cause.
+    """
+    if behind.mean < TIED_SHARE * first:
+        return True
+    return behind.p > TIED_P and behind.mean < 0.5 * first

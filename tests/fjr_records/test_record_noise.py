@@ -1,0 +1,65 @@
+"""Noise of records: from repeats, standstill or the highest lines; and when nothing shows it."""
+
+import numpy as np
+import pytest
+from scipy.signal import butter, sosfilt
+
+from fjr_interface.experiment import RecordDescription
+from fjr_records.record_noise import band_lines, record_noise
+from fjr_records.records import Record, RecordSet
+
+RATE, STD = 500.0, 2e-5
+
+
+def smooth(rng: np.random.Generator, samples: int) -> np.ndarray:
+    low = butter(4, 5.0, fs=RATE, output="sos")
+    motion = sosfilt(low, rng.standard_normal(samples))
+    return 0.01 * motion / motion.std()
+
+
+def records(*positions: np.ndarray, references: list[np.ndarray] | None = None) -> RecordSet:
+    made = []
+    for index, position in enumerate(positions):
+        reference = None if references is None else references[index]
+        description = RecordDescription.of("test", sample_rate_hz=RATE, realization=index)
+        made.append(Record(f"r{index}", description, reference, position * 0, position, None))
+    return RecordSet("test", RATE, tuple(made))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_highest_lines_show_white_noise(seed):
+    rng = np.random.default_rng(seed)
+    position = smooth(rng, 8000) + STD * rng.standard_normal(8000)
+    found = record_noise(records(position))
+    assert found.source == "residual" and found.std_rad == pytest.approx(STD, rel=0.15)
+
+
+def test_repeats_show_noise_whatever_the_motion():
+    rng = np.random.default_rng(0)
+    motion = 1e-3 * rng.standard_normal(8000)  # as white as noise
+    runs = [motion + STD * rng.standard_normal(8000) for _ in range(2)]
+    found = record_noise(records(*runs, references=[motion, motion]))
+    assert found.source == "repeats" and found.std_rad == pytest.approx(STD, rel=0.15)
+
+
+def test_a_standstill_shows_noise():
+    rng = np.random.default_rng(3)
+    moving = np.cumsum(smooth(rng, 3000))
+    still = np.full(1500, moving[-1])
+    position = np.concatenate([moving, still]) + STD * rng.standard_normal(4500)
+    found = record_noise(records(position))
+    assert found.source == "standstill" and found.std_rad == pytest.approx(STD, rel=0.2)
+
+
+def test_a_motion_up_to_the_highest_lines_shows_no_noise():
+    rng = np.random.default_rng(4)
+    falling = sosfilt(butter(1, 2.0, fs=RATE, output="sos"), rng.standard_normal(8000))
+    found = record_noise(records(np.diff(falling, prepend=0.0, n=1) + falling))
+    assert not found.known and np.isnan(found.std_rad)
+
+
+def test_the_band_ends_where_noise_begins():
+    rng = np.random.default_rng(5)
+    power = np.concatenate([np.full(40, 100.0), np.full(60, 1.0)]) * rng.uniform(0.8, 1.2, 100)
+    assert 38 <= band_lines(power, 1.0) <= 44
+    assert band_lines(power, 1e9) == 8

@@ -1,0 +1,115 @@
+"""Starts and bounds of fits follow the record, not a rig: other sizes and units, other starts."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fjr_sim_node import effects as fx
+from gap_diagnosis.which.search_space import Scales, space_for, starts
+
+PAPER_LIKE = Scales(
+    torque_nm=150.0, velocity_rad_s=8.0, angle_rad=0.065, deflection_rad=0.1,
+    period_s=1e-3, band_hz=50.0, inertia_kg_m2=0.5, peak_torque_nm=780.0,
+)  # fmt: skip
+FITTED = [effect.identifier for effect in fx.CATALOGUE if effect.starts]
+
+logarithmic = st.floats(-3.0, 3.0).map(lambda power: 10.0**power)
+
+
+@st.composite
+def any_scales(draw) -> Scales:
+    torque = draw(logarithmic)
+    rate = draw(st.sampled_from([100.0, 1000.0, 5000.0]))
+    angle = draw(logarithmic)
+    return Scales(
+        torque, draw(logarithmic), angle, angle * draw(st.floats(1e-3, 1.0)), 1.0 / rate,
+        draw(st.floats(0.01, 0.5)) * rate, draw(logarithmic), torque * draw(st.floats(1.0, 20.0)),
+    )  # fmt: skip
+
+
+@given(any_scales())
+def test_every_start_of_any_record_lies_within_the_bounds_of_its_fit(scales):
+    for effect in FITTED:
+        points = starts(effect, scales)
+        assert points and len(points) == len({tuple(point.items()) for point in points})
+        for point in points:
+            space = space_for({"jm": 1.0, "k0": 1.0}, point, scales)
+            low, high = space.bounds()
+            x = space.point(space.model(np.clip(np.zeros(low.size), low, high)))
+            assert np.isfinite(x).all() and (low <= high).all()
+            for name, value in point.items():
+                least, most = scales.bounds(name)
+                assert least <= value <= most, name
+                assert abs(value) >= scales.negligible(name) or value == 0.0, name
+
+
+def test_starts_follow_torque_velocity_and_angle_by_their_units():
+    other = replace(PAPER_LIKE, torque_nm=1.5, velocity_rad_s=0.08)
+    for effect, name, factor in [
+        ("torque_bias", "torque_nm", 1e-2),
+        ("transmission_damping", "nm_s_rad", 1.0),
+        ("quadratic_friction", "motor_nm_s2_rad2", 1e2),
+        ("stribeck_friction_motor", "velocity_rad_s", 1e-2),
+        ("backlash", "half_gap_rad", 1.0),
+        ("load_friction", "coefficient", 1.0),
+    ]:
+        first, second = starts(effect, PAPER_LIKE)[0], starts(effect, other)[0]
+        full = f"{effect}.{name}"
+        assert second[full] == pytest.approx(factor * first[full], rel=1e-9), full
+    slower = starts("delay", replace(PAPER_LIKE, period_s=1e-2))
+    assert slower[0]["delay.time_s"] == pytest.approx(1e-3)
+    assert slower[-1]["delay.time_s"] == pytest.approx(0.1)  # never beyond what is physical
+
+
+def test_the_gap_of_a_transmission_is_sought_in_its_deflection_not_in_the_motion():
+    stiff = replace(PAPER_LIKE, deflection_rad=1e-4)
+    gaps = [point["backlash.half_gap_rad"] for point in starts("backlash", stiff)]
+    assert max(gaps) < 1e-4
+    assert starts("presliding_friction", stiff) == starts("presliding_friction", PAPER_LIKE)
+
+
+@given(any_scales())
+def test_ripples_are_those_that_the_motion_can_show(scales):
+    cycles = scales.cycles()
+    assert 1 < cycles.size < 1000 and (np.diff(cycles) > 0.0).all()
+    travelled = 8.0 * scales.angle_rad  # to and fro, of a motion that looks like noise
+    assert cycles[0] == pytest.approx(max(0.25 * 2.0 * math.pi / travelled, 0.02), rel=0.05)
+    fine = cycles[cycles <= cycles[0] + 0.5 / scales.angle_rad]
+    assert np.diff(fine).size == 0 or np.diff(fine).max() * scales.angle_rad <= 0.5 * (1 + 1e-9)
+    sampled = 2.0 * math.pi / (3.0 * scales.period_s * scales.velocity_rad_s)
+    assert cycles[-1] <= max(sampled, 4.0 * cycles[0]) * (1 + 1e-9)
+
+
+def test_scales_are_those_of_the_record():
+    rate, band = 1000.0, 20.0
+    t = np.arange(8000) / rate
+    motion = 0.3 + 0.2 * np.sin(2.0 * np.pi * 5.0 * t)
+    noisy = motion + 1e-4 * np.random.default_rng(1).standard_normal(t.size)
+    torque = 3.0 * np.cos(2.0 * np.pi * 5.0 * t)
+    nominal = {"jm": 0.2, "j": 0.3, "k0": 100.0}
+    scales = Scales.of_record([noisy[:4000], noisy[4000:]], [torque], rate, band, nominal)
+    assert scales.angle_rad == pytest.approx(0.2 / math.sqrt(2.0), rel=1e-3)
+    assert scales.velocity_rad_s == pytest.approx(2.0 * math.pi / math.sqrt(2.0), rel=0.02)
+    assert scales.torque_nm == pytest.approx(3.0 / math.sqrt(2.0), rel=1e-3)
+    assert scales.deflection_rad == pytest.approx(scales.torque_nm / 100.0)
+    assert (scales.period_s, scales.band_hz) == (1e-3, band)
+    assert scales.inertia_kg_m2 == 0.5 and scales.peak_torque_nm == pytest.approx(3.0, rel=1e-3)
+    rigid = Scales.of_record([noisy], [torque], rate, band, {"jm": 0.5})
+    assert rigid.deflection_rad == rigid.angle_rad and rigid.inertia_kg_m2 == 0.5
+
+
+def test_the_paper_s_rig_starts_where_its_effects_usually_are():
+    def values(effect, name):
+        return sorted({point[f"{effect}.{name}"] for point in starts(effect, PAPER_LIKE)})
+
+    assert np.allclose(values("presliding_friction", "motor_rad"), [2e-5, 2e-4, 2e-3], rtol=0.05)
+    assert np.allclose(values("stribeck_friction_link", "velocity_rad_s")[:3], [0.02, 0.1, 0.5],
+                       rtol=0.05)  # fmt: skip
+    assert values("delay", "time_s")[0] == pytest.approx(1e-4)
+    assert PAPER_LIKE.bounds("extra_mode.frequency_hz") == pytest.approx((2.0, 120.0))
