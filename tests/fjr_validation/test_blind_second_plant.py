@@ -112,7 +112,8 @@ def test_an_effect_that_is_faint_changes_little_and_a_large_one_much(drawer):
     changes = []
     for r in (reference(0)[:1500], reference(2)[:1500]):
         bare = play(r)
-        peaks = {"torque_peak": float(np.abs(bare.u).max()),
+        peaks = {"deflection": float(np.std(bare.q - bare.th)),
+                 "torque_peak": float(np.abs(bare.u).max()),
                  "torque_rate_peak": float(np.abs(np.diff(bare.u)).max() * 1000.0)}  # fmt: skip
         draw = drawer(np.random.default_rng(3), replace(SCALES, **peaks))
         if not draw.lacking:
