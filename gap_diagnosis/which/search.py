@@ -52,7 +52,7 @@ class Search:
     def __init__(
         self, fitter: Fitter, progress: Progress = lambda _: None, until: float = math.inf
     ) -> None:
-        """Take the fitter, who is told what is tried, and when to stop adding (`time.monotonic`)."""
+        """Take the fitter, who is told what is tried, and the instant after which nothing is."""
         self._fitter, self._progress = fitter, progress
         self._until, self._complete = until, True
         self._fits: dict[tuple[str, ...], Fit] = {}
