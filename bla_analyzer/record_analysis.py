@@ -147,17 +147,22 @@ def _band(lost: np.ndarray, word: str = "") -> str:
 
 
 def _shape(groups: Sequence[Sequence[Record]]) -> list[str]:
-    """Return what the distribution of the reference's slope means for the BLA."""
-    slopes = [np.diff(group[0].reference) for group in groups if group[0].reference is not None]
-    slope = np.concatenate([s - s.mean() for s in slopes])
-    kurtosis = float(np.mean(slope**4) / np.mean(slope**2) ** 2)
-    if GAUSSIAN_KURTOSIS[0] <= kurtosis <= GAUSSIAN_KURTOSIS[1]:
+    """Return what the distribution of the reference and its velocity mean for the BLA."""
+    references = [group[0].reference for group in groups if group[0].reference is not None]
+    found = [_kurtosis(references), _kurtosis([np.diff(r) for r in references])]
+    low, high = GAUSSIAN_KURTOSIS
+    if all(low <= value <= high for value in found):
         return []
     return [
-        f"the velocity of the reference is not Gaussian (kurtosis {kurtosis:.2g}; noise and "
-        "multisines have 3, sweeps 1.5): as far as the rig is nonlinear, this BLA holds for this "
-        "signal, and noise or a multisine of the same spectrum has another one."
+        f"the reference is not Gaussian (kurtosis {found[0]:.2g}, of its velocity {found[1]:.2g}; "
+        "noise and multisines have 3, a sine 1.5): as far as the rig is nonlinear, this BLA holds "
+        "for this signal, and noise or a multisine of the same spectrum has another one."
     ]
+
+
+def _kurtosis(signals: Sequence[np.ndarray]) -> float:
+    values = np.concatenate([signal - signal.mean() for signal in signals])
+    return float(np.mean(values**4) / np.mean(values**2) ** 2)
 
 
 def _result(

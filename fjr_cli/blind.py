@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
+from enum import Enum
 from pathlib import Path
 from typing import Annotated
 
 import typer
-
-from fjr_kit.errors import InputError
 
 from .cli_errors import reports_errors
 from .worker_options import Dask, Workers
@@ -18,10 +17,27 @@ blind = typer.Typer(
 )
 
 
+class WorldName(str, Enum):
+    """Worlds of cases."""
+
+    closed = "closed"
+    open = "open"
+    records = "records"
+
+
 @blind.command()
-@reports_errors(kept="finished cases and verdicts are kept, and the same command goes on")
+@reports_errors(kept="finished cases are kept, and the same command goes on")
 def run(
-    cases: Annotated[int, typer.Option(min=1, max=1000, help="Number of cases.")] = 120,
+    cases: Annotated[
+        int, typer.Option(min=1, max=10_000, help="Number of cases, split among the worlds.")
+    ] = 120,
+    world: Annotated[
+        list[WorldName] | None,
+        typer.Option(
+            help="closed (only effects of the catalogue), open (with a remainder), records "
+            "(not periodic); default: all. Repeatable."
+        ),
+    ] = None,
     seed: Annotated[
         int | None,
         typer.Option(
@@ -36,13 +52,12 @@ def run(
     ] = Path("blind"),
     method: Annotated[
         list[str] | None,
-        typer.Option(help="fjr, refit, bic or sparse; default: all. Repeatable."),
+        typer.Option(help="fjr, refit, bic or sparse; default: fjr. Repeatable."),
     ] = None,
     dask: Dask = None,
     workers: Workers = None,
-    count_failures: Annotated[
-        bool,
-        typer.Option(help="Score even if a method failed on a case: that is a miss of it."),
+    keep_bags: Annotated[
+        bool, typer.Option(help="Keep the bags of finished cases (10 to 50 MB each).")
     ] = False,
 ) -> None:
     """Make sealed cases, diagnose them, commit to the verdicts, unseal and score."""
@@ -51,24 +66,17 @@ def run(
     require_report_extra()
     from fjr_kit.folder_lock import locked_folder
     from fjr_kit.progress import ProgressLine
-    from fjr_validation.blind.check import BlindCheck
-    from fjr_validation.blind.methods import METHODS
+    from fjr_validation.blind.answers import WORLDS
+    from fjr_validation.blind.check import BlindCheck, split
+    from fjr_validation.blind.methods import OURS
     from fjr_validation.blind.report import rehearse_report, score_check
 
+    worlds = [each for each in WORLDS if not world or WorldName(each) in world]
     with locked_folder(out), ProgressLine() as progress:
-        check = BlindCheck.begin(out, cases, seed, method or tuple(METHODS))
+        check = BlindCheck.begin(out, split(cases, worlds), seed, method or (OURS,))
         check.check_seals()
         rehearse_report(check)
-        check.make_cases(progress.report)
-        check.diagnose(dask, workers, progress.report)
-        failures = check.failures()
-        for sentence in failures:
-            progress.say(sentence)
-        if failures and not (count_failures or check.unsealed):
-            raise InputError(
-                f"{len(failures)} diagnoses failed, so the answers stay sealed; run again to try "
-                "those again, or with --count-failures to score them as misses."
-            )
+        check.run(dask, workers, progress.report, keep_bags=keep_bags)
         report = score_check(check)
     typer.echo(report)
 
@@ -76,9 +84,13 @@ def run(
 @blind.command()
 @reports_errors(kept="the answers are as they were")
 def score(
-    out: Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder of a finished check.")],
+    out: Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder of a check.")],
+    unfinished: Annotated[
+        bool,
+        typer.Option(help="End a check here whose cases have not all got their verdicts."),
+    ] = False,
 ) -> None:
-    """Score a check whose verdicts are all there, and write its report again."""
+    """Unseal and score a check whose verdicts are all there, or write its report again."""
     from fjr_kit.installed import require_report_extra
 
     require_report_extra()
@@ -88,4 +100,4 @@ def score(
 
     check = BlindCheck.open(out)
     with locked_folder(out):
-        typer.echo(score_check(check))
+        typer.echo(score_check(check, unfinished=unfinished))

@@ -13,7 +13,7 @@ from bla_analyzer.results.result import Result
 from fjr_bringup.rehearsal.result import Rehearsal
 from fjr_bringup.replay.comparison import ReplayResult
 from fjr_interface.experiment import Experiment
-from fjr_validation.blind.check import Manifest
+from fjr_validation.blind.check import Manifest, Unsealed
 from fjr_validation.blind.score import Scores
 from fjr_validation.paper.reproduction import PaperResults
 from gap_diagnosis.outcome.diagnosis import Diagnosis
@@ -28,6 +28,7 @@ DOCUMENTS: dict[str, type[BaseModel]] = {
     "replay": ReplayResult,
     "result": Result,
     "scores": Scores,
+    "unsealed": Unsealed,
 }
 """What is written as JSON, by the name of its schema."""
 

@@ -168,8 +168,8 @@ def periodic(experiment: Experiment | RecordDescription, source: str) -> Experim
     if isinstance(experiment, Experiment):
         return experiment
     raise InputError(
-        f"{source}: is a record that is not periodic (kind record), for which only import and "
-        "reading are there yet; give an experiment with a periodic reference."
+        f"{source}: is a record that is not periodic (kind record), but a multisine is "
+        "needed here; give an experiment with a periodic reference."
     )
 
 

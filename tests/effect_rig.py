@@ -75,7 +75,7 @@ MODERATE = {
     "actuator_lag": {"time_constant_s": 1e-3},
     "torque_saturation": {"limit_nm": 30.0},
     "torque_speed_limit": {"stall_nm": 30.0, "no_load_rad_s": 30.0},
-    "torque_slew_limit": {"limit_nm_s": 1e5},
+    "torque_slew_limit": {"limit_nm_s": 3e5},
     "dead_band": {"width_nm": 0.5},
     "torque_constant_ripple": {
         "amplitude": 0.1,

@@ -32,9 +32,9 @@ GROWTH = 1.4
 NARROWEST, WIDEST = 0.004, 0.12
 """Half width of a window over its frequency: no resonance is sought that is narrower, and the
 response is not held for a polynomial over more."""
-EXCESS = 1.0
-"""Disagreement of the orders beyond 1, times the root of the windows' number, up to which chance
-explains it."""
+BEND, EXCESS = 1.5, 1.0
+"""Mean disagreement of the orders, over what chance gives lines of equal variance, up to which a
+window may grow, and what is added for one window; it falls with the root of their number."""
 SCAN_PER_DECADE = 40
 MOST_LINES = 1200
 INPUT_VARIANCE_LOST = 0.1
@@ -213,7 +213,7 @@ def _half_widths(runs: Sequence[Run], centres: np.ndarray) -> np.ndarray:
             bends[i] = np.nan if fit is None else min(fit.bend, 1e6)
         for i in np.flatnonzero(growing):
             near = bends[(np.abs(centres - centres[i]) <= wider[i]) & np.isfinite(bends)]
-            if near.size and near.mean() <= 1.0 + EXCESS / np.sqrt(near.size):
+            if near.size and near.mean() <= BEND + EXCESS / np.sqrt(near.size):
                 halves[i] = wider[i]
             else:
                 growing[i] = False

@@ -108,7 +108,7 @@ def fit_window(
     middle, half = 0.5 * sum(window_hz), 0.5 * (window_hz[1] - window_hz[0])
     terms = order + 1
     kept: list[np.ndarray] = []
-    leverage: list[np.ndarray] = []
+    transients: list[np.ndarray] = []
     noise, noisy, noise_degrees, power = np.zeros((2, 2), complex), 0, 0, np.zeros(3)
     for run in runs:
         lines = run.window(*window_hz)
@@ -120,7 +120,7 @@ def fit_window(
         r, u, y = run.spectra[:, lines]
         columns = np.column_stack([powers * r[:, None], u, y])
         kept.append(columns - transient @ (transient.T @ columns))
-        leverage.append(np.sum(transient**2, axis=1))
+        transients.append(transient)
         power += np.sum(np.abs(run.spectra[:, lines]) ** 2, axis=1)
         if run.noise is not None:
             noise += run.noise[:, :, lines].sum(axis=2)
@@ -135,16 +135,13 @@ def fit_window(
     lower = _solve(columns, terms - 2, at)
     if solved is None or lower is None:
         return None
-    response, weights, left, hat = solved
+    response, weights, left, base = solved
     g = complex(response[1] / response[0])
     spread = float(np.sum(np.abs(weights) ** 2))
     residual = left.T @ left.conj() / degrees
     chance = _of_residual(g, residual) * (spread - float(np.sum(np.abs(lower[1]) ** 2)))
     apart_lower = abs(lower[0][1] - g * lower[0][0]) ** 2
-    shares = np.abs(weights) ** 2
-    own = np.minimum(hat + np.concatenate(leverage), _MOST_LEVERAGE)
-    variance = float(np.sum(shares * np.abs(left[:, 1] - g * left[:, 0]) ** 2 / (1.0 - own)))
-    effective = min(spread**2 / float(np.sum(shares**2)), float(degrees))
+    variance, effective = _robust(weights, left[:, 1] - g * left[:, 0], base, transients)
     return Fit(
         torque=complex(response[0]),
         position=complex(response[1]),
@@ -154,7 +151,7 @@ def fit_window(
         degrees=degrees,
         noise_degrees=noise_degrees,
         variance=variance,
-        variance_degrees=max(effective, 1.0),
+        variance_degrees=max(min(effective, float(degrees)), 1.0),
         power=power / len(columns),
         bend=apart_lower / chance if chance > 0 else float("inf" if apart_lower else 0.0),
     )
@@ -163,7 +160,7 @@ def fit_window(
 def _solve(
     columns: np.ndarray, terms: int, at: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None:
-    """Return (G_ru, G_ry), the weight of each line, what is left (lines, 2), and leverages."""
+    """Return (G_ru, G_ry), the weight of each line, what is left (lines, 2), and a base."""
     inputs, outputs = columns[:, :terms], columns[:, -2:]
     scale = np.sqrt(np.sum(np.abs(inputs) ** 2, axis=0))
     if not (scale > 0).all():
@@ -175,4 +172,36 @@ def _solve(
         return None
     projected = base.conj().T @ outputs
     left = outputs - base @ projected
-    return weights.conj() @ outputs, weights, left, np.sum(np.abs(base) ** 2, axis=1)
+    return weights.conj() @ outputs, weights, left, base
+
+
+def _robust(
+    weights: np.ndarray, error: np.ndarray, base: np.ndarray, transients: Sequence[np.ndarray]
+) -> tuple[float, float]:
+    """Return the variance of a weighted sum of errors of unequal variance, and its degrees.
+
+    Squared residuals over what their leverage leaves of them, and Satterthwaite's degrees of
+    freedom were all variances equal (Bell and McCaffrey, Survey Methodology 28(2), 2002).
+
+    Args:
+        weights: complex (lines,), of the sum.
+        error: complex (lines,), residual.
+        base: complex (lines, terms), orthonormal base of the inputs.
+        transients: (lines of a run, terms) each, orthonormal base of the transient of each run.
+    """
+    leverage = np.sum(np.abs(base) ** 2, axis=1)
+    leverage += np.concatenate([np.sum(part**2, axis=1) for part in transients])
+    leverage = np.minimum(leverage, _MOST_LEVERAGE)
+    shares = np.abs(weights) ** 2 / (1.0 - leverage)
+    cross = float(np.sum(np.abs((base.conj().T * shares) @ base) ** 2))
+    start = 0
+    for part in transients:
+        of_run = slice(start, start + len(part))
+        weighted = part.T * shares[of_run]
+        cross += float(np.sum((weighted @ part) ** 2))
+        cross += 2.0 * float(np.sum(np.abs(weighted @ base[of_run]) ** 2))
+        start += len(part)
+    squares = float(np.sum(shares**2 * (1.0 - 2.0 * leverage))) + cross
+    whole = float(np.sum(shares * (1.0 - leverage)))
+    variance = float(np.sum(shares * np.abs(error) ** 2))
+    return variance, whole**2 / squares if squares > 0 else 1.0

@@ -164,14 +164,14 @@ def _time(signals: TimeSignals) -> Plot:
         ("torque", signals.torque_nm, "N m"),
         ("position", signals.position_rad, "rad"),
     )
-    rows = tuple(row for row in rows if np.isfinite(row[1]).any())
+    shown = [row for row in rows if np.isfinite(row[1]).any()]
     traces = []
-    for row, (name, values, unit) in enumerate(rows, start=1):
+    for row, (name, values, unit) in enumerate(shown, start=1):
         t, y = extremes(signals.time_s, values)
         style: Options = {"dash": "solid", "width": 1.0, "row": row, "showlegend": False}
         traces.append(trace(t, y, name, "--ink", **style, unit=unit, at=SECONDS))
-    titles = [f"{name} ({unit})" for name, _, unit in rows]
-    return {"data": traces, "layout": stack(titles, [1.0] * len(rows), "time (s)")}
+    titles = [f"{name} ({unit})" for name, _, unit in shown]
+    return {"data": traces, "layout": stack(titles, [1.0] * len(shown), "time (s)")}
 
 
 def _amplitudes(result: Result) -> np.ndarray:

@@ -161,7 +161,7 @@ class Result(Document):
         controller: description of the controller, if known.
     """
 
-    schema_name: Literal["fjr_rig/result/2"] = Field("fjr_rig/result/1", alias="schema")
+    schema_name: Literal["fjr_rig/result/2"] = Field("fjr_rig/result/2", alias="schema")
     source: str
     excitation: Excitation
     sample_rate_hz: Annotated[Number, Unit("Hz")]

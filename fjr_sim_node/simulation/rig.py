@@ -19,7 +19,7 @@ LINK, MOTOR = 0, 2
 
 _TIME, _SLEWED, _HEAD, _RING = 10, 11, 12, 13
 _RING_SIZE = 16_384  # samples of the longest delay: 100 ms at 20 kHz, each in eight parts
-_SLEW_PARTS = 4
+_SLEW_PARTS = 8
 
 
 def at_rest(elapsed_s: float = 0.0) -> np.ndarray:

@@ -1,7 +1,8 @@
-"""The blind check: cases from a second plant, sealed answers, committed verdicts, scores.
+"""The blind check: random rigs of a second plant, sealed answers, raw verdicts, scores.
 
-Begin with `check`, which keeps the order: `cases` are drawn and made by a process of their own,
-their answers sealed (`seal`), all `methods` give verdicts, then come `score` and `report`.
-`second_plant` shares nothing with the simulator; `baselines` are the plain methods; `calibrate`
-sets confidence and intervals on training cases.
+A case is made by `worlds`: `rigs` draws plant and controller, `excitations` what is played on them,
+`stage` friction, noise and datasheet, `causes` and `remainders` what the datasheet does not say,
+`visibility` how large to make it; `second_plant` plays it. `check` runs a check, `lanes` side by
+side; `outcome` and `score` judge its verdicts, `report` writes them up; `frozen` names by a hash
+what may not change between.
 """

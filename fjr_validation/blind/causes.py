@@ -9,86 +9,12 @@ checked; where the two plants have other laws, nothing is.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from .draw import Draw, Drawer, Scales, linear, phase, sign
 from .rigs import log_uniform
-
-Settings = dict[str, float]
-
-
-@dataclass(frozen=True)
-class Scales:
-    """What a rig does at its highest level: the measures of sizes, SI units, rms unless said."""
-
-    torque: float
-    torque_peak: float
-    torque_rate_peak: float
-    speed: float
-    speed_peak: float
-    angle: float
-    deflection: float
-    coulomb: float  # level on the motor
-    damping: float  # 2 sqrt(k J_eff), N m s/rad; critical damping of the resonance
-    link_inertia: float
-    resonance_hz: float
-    band_hz: float
-    crossover_hz: float
-
-
-@dataclass(frozen=True)
-class Draw:
-    """An effect with its shape drawn and its size free.
-
-    Attributes:
-        name: identifier of the catalogue, or a name of ours outside it.
-        settings: returns settings of the second plant, or values of its bare plant, for a size.
-        start: a size to start searches from.
-        most: greatest size that makes sense.
-        same_as: catalogue parameter by setting, where both mean the same.
-        lacking: values of the bare plant that the datasheet then lacks.
-    """
-
-    name: str
-    settings: Callable[[float], Settings]
-    start: float
-    most: float
-    same_as: Mapping[str, str] = field(default_factory=dict)
-    lacking: tuple[str, ...] = ()
-
-    def truth(self, settings: Mapping[str, float]) -> Settings:
-        """Return the true values of the catalogue's parameters, as far as both mean the same."""
-        return {self.same_as[name]: value for name, value in settings.items()
-                if name in self.same_as}  # fmt: skip
-
-
-Drawer = Callable[[np.random.Generator, Scales], Draw]
-
-
-def linear(
-    name: str, scaled: Settings, start: float, most: float, shape: Settings | None = None,
-    same_as: Mapping[str, str] | None = None,
-) -> Draw:  # fmt: skip
-    """Return a draw whose settings are proportional to its size, beside a shape."""
-    fixed = shape or {}
-
-    def settings(size: float) -> Settings:
-        return fixed | {setting: factor * size for setting, factor in scaled.items()}
-
-    full = {ours: f"{name}.{theirs}" for ours, theirs in (same_as or {}).items()}
-    return Draw(name, settings, start, most, full)
-
-
-def sign(rng: np.random.Generator) -> float:
-    """Return -1 or 1."""
-    return float(rng.choice([-1.0, 1.0]))
-
-
-def phase(rng: np.random.Generator) -> float:
-    """Return an angle in (-pi, pi)."""
-    return float(rng.uniform(-np.pi, np.pi))
 
 
 def _cycles(rng: np.random.Generator, at: Scales) -> float:
@@ -119,8 +45,11 @@ def _torque_bias(rng: np.random.Generator, at: Scales) -> Draw:
                   same_as={"bias_nm": "torque_nm"})  # fmt: skip
 
 
-def _presliding(_: np.random.Generator, at: Scales) -> Draw:
-    return linear("presliding_friction", {"presliding_motor_rad": at.angle}, 0.01, 0.3)
+def _presliding(rng: np.random.Generator, at: Scales) -> Draw:
+    scaled = {"presliding_motor_rad": at.angle}
+    if math.isfinite(at.resonance_hz) and rng.random() < 0.5:
+        scaled["presliding_link_rad"] = at.angle * log_uniform(rng, 0.5, 2.0)
+    return linear("presliding_friction", scaled, 0.01, 0.3)
 
 
 def _lugre(rng: np.random.Generator, at: Scales) -> Draw:
@@ -140,8 +69,9 @@ def _load(_: np.random.Generator, __: Scales) -> Draw:
 def _directional(rng: np.random.Generator, _: Scales) -> Draw:
     ways = [1.0, float(rng.uniform(0.0, 0.4))]
     forward, backward = ways if rng.random() < 0.5 else ways[::-1]
-    return linear("directional_loss", {"loss_forward": forward, "loss_backward": backward}, 0.05,
-                  0.4)  # fmt: skip
+    scaled = {"loss_forward": forward, "loss_backward": backward}
+    same = {"loss_forward": "forward", "loss_backward": "backward"}
+    return linear("directional_loss", scaled, 0.05, 0.4, same_as=same)
 
 
 def _ripple(name: str, stem: str, unit: str, start: float, most: float,
@@ -176,7 +106,8 @@ def _piecewise(rng: np.random.Generator, at: Scales) -> Draw:
 
 
 def _asymmetric_stiffness(rng: np.random.Generator, _: Scales) -> Draw:
-    return linear("asymmetric_stiffness", {"stiffness_asymmetry": sign(rng)}, 0.05, 0.4)
+    return linear("asymmetric_stiffness", {"stiffness_asymmetry": sign(rng)}, 0.05, 0.4,
+                  same_as={"stiffness_asymmetry": "relative"})  # fmt: skip
 
 
 def _hysteresis(rng: np.random.Generator, at: Scales) -> Draw:
@@ -219,19 +150,29 @@ def _saturation(_: np.random.Generator, at: Scales) -> Draw:
 
 def _speed_limit(rng: np.random.Generator, at: Scales) -> Draw:
     stall = at.torque_peak * rng.uniform(1.2, 1.8)
+    same = {"stall_nm": "stall_nm", "no_load_rad_s": "no_load_rad_s"}
     return Draw(
         "torque_speed_limit",
-        lambda size: {"stall_nm": stall, "no_load_rad_s": at.speed_peak / size}, 0.5, 0.95,
-    )  # fmt: skip
+        lambda size: {"stall_nm": stall, "no_load_rad_s": at.speed_peak / size},
+        0.5,
+        0.95,
+        {ours: f"torque_speed_limit.{theirs}" for ours, theirs in same.items()},
+    )
 
 
 def _slew(_: np.random.Generator, at: Scales) -> Draw:
-    return Draw("torque_slew_limit", lambda size: {"slew_nm_s": at.torque_rate_peak / size}, 1.0,
-                20.0)  # fmt: skip
+    return Draw(
+        "torque_slew_limit",
+        lambda size: {"slew_nm_s": at.torque_rate_peak / size},
+        1.0,
+        20.0,
+        {"slew_nm_s": "torque_slew_limit.limit_nm_s"},
+    )
 
 
 def _dead_band(_: np.random.Generator, at: Scales) -> Draw:
-    return linear("dead_band", {"deadband_nm": at.torque}, 0.03, 0.3)
+    return linear("dead_band", {"deadband_nm": at.torque}, 0.03, 0.3,
+                  same_as={"deadband_nm": "width_nm"})  # fmt: skip
 
 
 def _quantization(_: np.random.Generator, at: Scales) -> Draw:
@@ -249,18 +190,21 @@ def _drift(rng: np.random.Generator, _: Scales) -> Draw:
                   {"drift_time_s": log_uniform(rng, 15.0, 60.0)})  # fmt: skip
 
 
-def _lacking(name: str, value: str, unit: Callable[[Scales], float], most: float) -> Drawer:
+def _lacking(
+    name: str, value: str, unit: Callable[[Scales], float], most: float, parameter: str
+) -> Drawer:
     def draw(_: np.random.Generator, at: Scales) -> Draw:
         factor = unit(at)
         names = (value,) if math.isfinite(at.resonance_hz) else (value, value[:2])
-        return Draw(name, lambda size: {value: factor * size}, 0.1 * most, most, {}, names)
+        same = {value: f"{name}.{parameter}"}
+        return Draw(name, lambda size: {value: factor * size}, 0.1 * most, most, same, names)
 
     return draw
 
 
 _FRICTION: tuple[Drawer, ...] = (
-    _lacking("coulomb_friction", "fsm", lambda at: at.torque, 0.5),
-    _lacking("viscous_friction", "fvm", lambda at: at.torque / at.speed, 0.5),
+    _lacking("coulomb_friction", "fsm", lambda at: at.torque, 0.5, "motor_nm"),
+    _lacking("viscous_friction", "fvm", lambda at: at.torque / at.speed, 0.5, "motor_nm_s_rad"),
 )
 
 _ANY_AXIS: tuple[Drawer, ...] = (
@@ -301,8 +245,8 @@ _FLEXIBLE: tuple[Drawer, ...] = (
 def drawers(*, rigid: bool, stationary: bool) -> tuple[Drawer, ...]:
     """Return the drawers of causes that a rig can have.
 
-    A gain of the torque is never one: it is exactly a scale of all parameters. A drift is one only
-    where friction does not scatter anyway.
+    A gain of the torque is never one: it is exactly a scale of all parameters. Nor is a stiffness
+    that the datasheet lacks. A drift is one only where friction does not scatter anyway.
     """
     flexible = () if rigid else _FLEXIBLE
     return (*_FRICTION, *_ANY_AXIS, *flexible, *(() if stationary else (_drift,)))
@@ -324,7 +268,7 @@ FAMILIES: tuple[frozenset[str], ...] = tuple(
 """Effects that are near each other: two of one family are never put into one case."""
 
 
-def compatible(names: list[str], name: str) -> bool:
+def compatible(names: Sequence[str], name: str) -> bool:
     """Tell whether a further cause differs from all others and is near none of them."""
     return name not in names and not any(
         name in family and other in family for family in FAMILIES for other in names

@@ -1,24 +1,32 @@
-"""Runs a blind check: cases made and sealed, verdicts committed, only then answers unsealed.
+"""Runs a blind check: cases made and sealed, verdicts kept, only then answers unsealed.
 
-The protocol, and what it is worth: a process of its own makes the cases and gives out bags,
-encrypted answers and the SHA-256 of each answer. The diagnosis processes are told the folder of one
-case's bags and nothing else; key and seed are in neither their arguments, nor their environment,
-nor the folder of the check, but in a file of the user's state folder. When every case has its
-verdicts, the SHA-256 of each verdict is written down; then the answers are decrypted, compared with
-what was committed to, and scored. After that no verdict is made or replaced. This guards against a
-method that sees an answer by accident or by convenience, and lets others check that neither answers
-nor verdicts were changed. It does not guard against a user who breaks his own seal: who knows the
-seed can make the cases again, and who owns the state folder can read the key.
+The protocol, and what it is worth: processes of their own make the cases and give out bags and
+encrypted answers with their SHA-256. The diagnosis processes are told the folder of one case's bags
+and nothing else; key and seed are in neither their arguments, nor their environment, nor the folder
+of the check, but in a file of the user's state folder. When every case has its verdicts, the
+SHA-256 of them all is written down; then the answers are decrypted, compared with what was
+committed to, and scored. After that no verdict is made or replaced. This guards against a method
+that sees an answer by accident or by convenience, and lets others check that neither answers nor
+verdicts were changed. It does not guard against a user who breaks his own seal: who knows the seed
+can make the cases again, and who owns the state folder can read the key.
+
+OUT/blind.json        what the check is: identity, cases of each world, methods, frozen sources
+OUT/sealed.jsonl      a sealed answer for each case that was made; the last one of a case counts
+OUT/verdicts.jsonl    a verdict for each case and method, as soon as it is there
+OUT/cases/            bags of the cases that are under way, removed once all methods have seen them
+OUT/unsealed.json     seed, key and SHA-256 of the verdicts
+OUT/answers.jsonl     the answers, unsealed
+OUT/report/           scores, figures, report
 """
 
 from __future__ import annotations
 
 import json
 import secrets
-import subprocess
-import sys
-from collections.abc import Callable, Mapping, Sequence
+import shutil
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 
@@ -28,14 +36,16 @@ from fjr_kit.atomic import write_whole
 from fjr_kit.errors import InputError
 from fjr_kit.installed import product_version
 from fjr_kit.result_types import Document
-from fjr_kit.tasks import Task, computed
 
-from .cases import Answer
-from .files import case_folder, case_name, read_json, sealed_file, verdict_file, write_json
-from .methods import METHODS, check_methods, verdict
-from .seal import Secret, decrypt, digest
+from .answers import WORLDS, Answer, World
+from .frozen import frozen_digest
+from .json_lines import JsonLines
+from .lanes import Job, finished_jobs
+from .making import make_sealed
+from .methods import check_methods, verdicts
+from .seal import Secret, digest, opened_line
 
-MOST_CASES = 1000
+MOST_CASES = 10_000
 
 Report = Callable[[int, int, str], None]
 """Called with (done, all, what was done)."""
@@ -44,11 +54,44 @@ Report = Callable[[int, int, str], None]
 class Manifest(Document):
     """What `blind.json` holds: what a check is; see `BlindCheck`."""
 
-    schema_name: Literal["fjr_rig/blind/1"] = Field("fjr_rig/blind/1", alias="schema")
+    schema_name: Literal["fjr_rig/blind/2"] = Field("fjr_rig/blind/2", alias="schema")
     check: str
-    cases: int
+    cases: dict[str, int]
     methods: tuple[str, ...]
+    frozen: str
     version: str
+
+
+class Unsealed(Document):
+    """What `unsealed.json` holds."""
+
+    schema_name: Literal["fjr_rig/unsealed/1"] = Field("fjr_rig/unsealed/1", alias="schema")
+    seed: int
+    key: str
+    verdicts_sha256: str
+    finished: bool
+
+
+@dataclass(frozen=True)
+class Case:
+    """One case of a check."""
+
+    world: World
+    number: int
+
+    @property
+    def name(self) -> str:
+        """Its name, which says its world and nothing else."""
+        return f"{self.world}_{self.number:04d}"
+
+
+def split(count: int, worlds: Sequence[World]) -> dict[str, int]:
+    """Return how many of `count` cases each world gets: the same, the first ones what is over."""
+    chosen = [world for world in WORLDS if world in worlds]
+    return {
+        world: count // len(chosen) + (place < count % len(chosen))
+        for place, world in enumerate(chosen)
+    }
 
 
 @dataclass(frozen=True)
@@ -57,43 +100,38 @@ class BlindCheck:
 
     Attributes:
         folder: where it is.
-        check: its identity.
-        count: number of cases.
-        methods: names of the methods compared.
-        version: version of the product that began it.
+        manifest: what it is.
     """
 
     folder: Path
-    check: str
-    count: int
-    methods: tuple[str, ...]
-    version: str
+    manifest: Manifest
 
     @classmethod
     def begin(
-        cls, folder: Path, count: int, seed: int | None, methods: Sequence[str] = tuple(METHODS)
+        cls, folder: Path, cases: Mapping[str, int], seed: int | None, methods: Sequence[str]
     ) -> BlindCheck:
         """Begin a check, or take up the one in the folder.
 
         Raises:
-            InputError: the folder holds another check, or one that was begun on another machine.
+            InputError: the folder holds another check, one that was begun on another machine, or
+                one whose frozen sources have changed.
         """
-        check_methods(list(methods))
-        if not 1 <= count <= MOST_CASES:
-            raise InputError(f"--cases must lie in [1, {MOST_CASES}], not {count}.")
-        manifest = folder / "blind.json"
-        if manifest.exists():
-            return cls.open(folder)._as_ordered(count, seed, methods)
+        check_methods(methods)
+        if (folder / "blind.json").exists():
+            return cls.open(folder)._as_ordered(cases, seed, methods)
         if folder.exists() and any(folder.iterdir()):
             raise InputError(f"{folder} holds something else; choose another folder.")
-        check = secrets.token_hex(8)
-        Secret.draw(seed).save(check)
         begun = Manifest(
-            check=check, cases=count, methods=tuple(methods), version=product_version()
+            check=secrets.token_hex(8),
+            cases=dict(cases),
+            methods=tuple(methods),
+            frozen=frozen_digest(),
+            version=product_version(),
         )
+        Secret.draw(seed).save(begun.check)
         folder.mkdir(parents=True, exist_ok=True)
-        write_whole(manifest, begun.to_json())
-        return cls.open(folder)
+        write_whole(folder / "blind.json", begun.to_json())
+        return cls(folder, begun)
 
     @classmethod
     def open(cls, folder: Path) -> BlindCheck:
@@ -101,24 +139,60 @@ class BlindCheck:
         manifest = folder / "blind.json"
         if not manifest.exists():
             raise InputError(f"{folder} holds no blind check; begin one with `fjr blind run`.")
-        begun = Manifest.read(manifest)
-        return cls(folder, begun.check, begun.cases, begun.methods, begun.version)
+        return cls(folder, Manifest.read(manifest))
 
-    def _as_ordered(self, count: int, seed: int | None, methods: Sequence[str]) -> BlindCheck:
+    def _as_ordered(
+        self, cases: Mapping[str, int], seed: int | None, methods: Sequence[str]
+    ) -> BlindCheck:
         """Return this check; raise InputError if what is ordered now is another one."""
-        if count != self.count or set(methods) != set(self.methods):
+        begun = self.manifest
+        if dict(cases) != begun.cases or set(methods) != set(begun.methods):
+            worlds = ", ".join(f"{count} {world}" for world, count in begun.cases.items())
             raise InputError(
-                f"{self.folder} holds a check of {self.count} cases with the methods "
-                f"{', '.join(self.methods)}; order the same, or choose another folder."
+                f"{self.folder} holds a check of other cases or methods ({worlds}; "
+                f"{', '.join(begun.methods)}); order the same, or choose another folder."
             )
-        if seed is not None and not self.unsealed and Secret.load(self.check).seed != seed:
+        if seed is not None and not self.unsealed and Secret.load(begun.check).seed != seed:
             raise InputError(f"{self.folder} holds a check of another seed; choose another folder.")
+        if not self.unsealed and begun.frozen != frozen_digest():
+            raise InputError(
+                f"{self.folder}: how cases are made or scored has changed since this check began "
+                f"(frozen as {begun.frozen[:12]}); go back to that version, or begin a new check."
+            )
         return self
+
+    @cached_property
+    def cases(self) -> tuple[Case, ...]:
+        """All cases, the worlds mixed so that a part of a check holds a part of each."""
+        numbered = [
+            ((number + 0.5) / count, world, number)
+            for world, count in self.manifest.cases.items()
+            for number in range(count)
+        ]
+        return tuple(Case(world, number) for _, world, number in sorted(numbered))  # type: ignore[arg-type]
 
     @property
     def unsealed(self) -> bool:
         """Whether the answers have been unsealed."""
-        return (self.folder / "answers.json").exists()
+        return (self.folder / "unsealed.json").exists()
+
+    @property
+    def _verdicts(self) -> JsonLines:
+        return JsonLines(self.folder / "verdicts.jsonl")
+
+    @property
+    def _sealed(self) -> JsonLines:
+        return JsonLines(self.folder / "sealed.jsonl")
+
+    def verdicts(self) -> list[dict[str, Any]]:
+        """Return all verdicts that are there."""
+        return self._verdicts.read()
+
+    def missing(self) -> list[Case]:
+        """Return the cases that lack a verdict of some method."""
+        seen = {(line["case"], line["method"]) for line in self.verdicts()}
+        methods = self.manifest.methods
+        return [case for case in self.cases if any((case.name, m) not in seen for m in methods)]
 
     def check_seals(self) -> None:
         """Open every seal that is there, and forget what it holds: what unsealing will rest on.
@@ -126,158 +200,100 @@ class BlindCheck:
         Raises:
             InputError: the key cannot be read, or a seal is not what was committed to.
         """
-        if self.unsealed:
-            return
-        secret = Secret.load(self.check)
-        if (self.folder / "commitments.json").exists():
-            committed = read_json(self.folder / "commitments.json")
-            for index in range(self.count):
-                self._as_committed(index, self._open(index, secret.key), committed)
+        if not self.unsealed:
+            key = Secret.load(self.manifest.check).key
+            for line in self._sealed.read():
+                opened_line(line, key)
 
-    def make_cases(self, report: Report = lambda *_: None) -> None:
-        """Make the cases that are missing, in a process of their own, and commit to the answers."""
-        there = sum(case_folder(self.folder, index).exists() for index in range(self.count))
-        if there < self.count:
-            secret = Secret.load(self.check)
-            order = {
-                "folder": str(self.folder.absolute()),
-                "cases": self.count,
-                "seed": secret.seed,
-                "key": secret.key.hex(),
-            }
-            _have_made(order, lambda name, made: report(there + made, self.count, f"{name} made"))
-        if not (self.folder / "commitments.json").exists():
-            self._commit_answers()
-
-    def _commit_answers(self) -> None:
-        key = Secret.load(self.check).key
-        digests = {}
-        for index in range(self.count):
-            file = sealed_file(self.folder, index)
-            digests[case_name(index)] = digest(decrypt(file.read_bytes(), key, str(file)))
-        write_json(self.folder / "commitments.json", digests)
-
-    def diagnose(
+    def run(
         self,
         scheduler: str | None = None,
         workers: int | None = None,
         report: Report = lambda *_: None,
+        *,
+        keep_bags: bool = False,
     ) -> None:
-        """Put every method to every case that lacks its verdict; failed ones are tried again."""
-        tasks = [
-            self._task(method, index)
-            for method in self.methods
-            for index in range(self.count)
-            if not self._finished(method, index)
-        ]
-        total = self.count * len(self.methods)
-        done = total - len(tasks)
-        if tasks and self.unsealed:
+        """Make each case that lacks a verdict and put every method to it, several side by side.
+
+        Raises:
+            InputError: the answers are unsealed, no scheduler answers, or a process died.
+        """
+        missing = self.missing()
+        if missing and self.unsealed:
             raise InputError(
                 f"{self.folder} lacks verdicts, but its answers are unsealed; begin a new check."
             )
-        for _, values in computed(tasks, workers=workers, scheduler=scheduler, apart=True):
-            index = int(values["case"].removeprefix("case_"))
-            write_json(verdict_file(self.folder, values["method"], index), values)
+        done, total = len(self.cases) - len(missing), len(self.cases)
+        sealed, kept = self._sealed, self._verdicts
+        known = {(line["case"], line["method"]) for line in kept.read()}
+        for job, lines in finished_jobs(self._jobs(missing), sealed.append, scheduler, workers):
+            new = [line for line in lines if (line["case"], line["method"]) not in known]
+            kept.append(*new)
+            if not keep_bags:
+                shutil.rmtree(job.folder, ignore_errors=True)
             done += 1
-            said = values.get("error") or values["diagnosis"]["verdict"]
-            report(done, total, f"{values['case']} by {values['method']}: {said}")
+            said = ", ".join(line.get("error") or line["diagnosis"]["verdict"] for line in lines)
+            report(done, total, f"{job.name}: {said}")
 
-    def _task(self, method: str, index: int) -> Task:
-        folder = case_folder(self.folder, index).absolute()
-        return Task(f"{method}-{folder.name}", verdict, {"method": method, "folder": folder})
+    def _jobs(self, cases: Sequence[Case]) -> Iterator[Job]:
+        """Yield what is to be done, clearing away what an interrupted run left of the case."""
+        if not cases:
+            return
+        secret = Secret.load(self.manifest.check)
+        for case in cases:
+            folder = (self.folder / "cases" / case.name).absolute()
+            shutil.rmtree(folder, ignore_errors=True)
+            order = {"case": case.name, "folder": folder}
+            made = {"world": case.world, "number": case.number, "seed": secret.seed}
+            yield Job(
+                case.name,
+                folder,
+                (make_sealed, {**order, **made, "key": secret.key}),
+                (verdicts, {**order, "methods": self.manifest.methods}),
+            )
 
-    def _finished(self, method: str, index: int) -> bool:
-        file = verdict_file(self.folder, method, index)
-        return file.exists() and (self.unsealed or "diagnosis" in read_json(file))
+    def unseal(self, *, unfinished: bool = False) -> list[tuple[str, Answer]]:
+        """Commit to all verdicts, then decrypt the answers; return those of cases with verdicts.
 
-    def failures(self) -> list[str]:
-        """Return what methods failed on, one sentence each."""
-        found = [values for values in self.read_verdicts().values() if "error" in values]
-        return [f"{v['method']} failed on {v['case']}: {v['error']}" for v in found]
-
-    def read_verdicts(self) -> dict[tuple[str, int], dict[str, Any]]:
-        """Return all verdicts by (method, case)."""
-        return {
-            (method, index): read_json(verdict_file(self.folder, method, index))
-            for method in self.methods
-            for index in range(self.count)
-        }
-
-    def unseal(self) -> list[Answer]:
-        """Commit to all verdicts, then decrypt the answers; return them.
+        Args:
+            unfinished: end the check here though cases lack verdicts.
 
         Raises:
             InputError: a verdict is missing or was changed, or an answer is not what was
                 committed to.
         """
-        self._commit_verdicts()
-        answers = self.folder / "answers.json"
-        if not answers.exists():
-            secret = Secret.load(self.check)
-            opened = [self._open(index, secret.key) for index in range(self.count)]
-            write_json(answers, {"seed": secret.seed, "key": secret.key.hex(), "answers": opened})
-        committed = read_json(self.folder / "commitments.json")
-        found = []
-        for index, text in enumerate(read_json(answers)["answers"]):
-            self._as_committed(index, text, committed)
-            values = json.loads(text)
-            values.pop("salt")
-            found.append(Answer.from_json(values))
-        return found
-
-    def _open(self, index: int, key: bytes) -> str:
-        file = sealed_file(self.folder, index)
-        try:
-            return decrypt(file.read_bytes(), key, str(file)).decode()
-        except OSError as error:
+        missing = self.missing()
+        if missing and not unfinished and not self.unsealed:
             raise InputError(
-                f"{file} cannot be read: {error.strerror}; begin a new check."
-            ) from None
-
-    def _as_committed(self, index: int, answer: str, committed: Mapping[str, str]) -> None:
-        if digest(answer.encode()) != committed.get(case_name(index)):
-            raise InputError(
-                f"{self.folder}: the answer of {case_name(index)} is not what was committed to; "
-                "begin a new check."
+                f"{self.folder} lacks the verdicts on {len(missing)} of {len(self.cases)} cases; "
+                "finish it with `fjr blind run`, or end it here with --unfinished."
             )
+        verdicts_sha256 = digest(self._verdicts.path.read_bytes() if self.verdicts() else b"")
+        if not self.unsealed:
+            self._open_all(verdicts_sha256, finished=not missing)
+        opened = Unsealed.read(self.folder / "unsealed.json")
+        if opened.verdicts_sha256 != verdicts_sha256:
+            raise InputError(
+                f"{self._verdicts.path} is not what was committed to before unsealing; some "
+                "verdicts were changed."
+            )
+        answers = JsonLines(self.folder / "answers.jsonl").read()
+        return [(line.pop("case"), Answer.from_json(line)) for line in answers]
 
-    def _commit_verdicts(self) -> None:
-        digests = {}
-        for method in self.methods:
-            for index in range(self.count):
-                file = verdict_file(self.folder, method, index)
-                if not file.exists():
-                    raise InputError(
-                        f"{file} is missing; finish the check with `fjr blind run` first."
-                    )
-                digests[str(file.relative_to(self.folder))] = digest(file.read_bytes())
-        committed = self.folder / "verdicts.json"
-        if not committed.exists():
-            write_json(committed, digests)
-        elif read_json(committed) != digests:
-            raise InputError(f"{committed} does not match the verdicts; some were changed.")
-
-
-def _have_made(order: dict[str, Any], made: Callable[[str, int], None]) -> None:
-    """Run the case-making process; raise InputError with its last line if it fails."""
-    command = [sys.executable, "-m", "fjr_validation.blind.maker"]
-    pipes: dict[str, Any] = {
-        "stdin": subprocess.PIPE,
-        "stdout": subprocess.PIPE,
-        "stderr": subprocess.PIPE,
-    }
-    with subprocess.Popen(command, text=True, **pipes) as process:
-        assert process.stdin and process.stdout and process.stderr
-        try:
-            json.dump(order, process.stdin)
-            process.stdin.close()
-            for count, line in enumerate(process.stdout, 1):
-                made(line.strip(), count)
-            problem = process.stderr.read().strip()
-        except BaseException:
-            process.wait()
-            raise
-    if process.returncode:
-        last = problem.splitlines()[-1] if problem else f"status {process.returncode}"
-        raise InputError(f"The cases could not be made: {last}")
+    def _open_all(self, verdicts_sha256: str, *, finished: bool) -> None:
+        secret = Secret.load(self.manifest.check)
+        last = {line["case"]: line for line in self._sealed.read()}
+        missing = {case.name for case in self.missing()}
+        lines = [
+            json.dumps(opened_line(last[case.name], secret.key), separators=(",", ":"))
+            for case in self.cases
+            if case.name not in missing
+        ]
+        write_whole(self.folder / "answers.jsonl", "".join(line + "\n" for line in lines))
+        unsealed = Unsealed(
+            seed=secret.seed,
+            key=secret.key.hex(),
+            verdicts_sha256=verdicts_sha256,
+            finished=finished,
+        )
+        write_whole(self.folder / "unsealed.json", unsealed.to_json())

@@ -27,7 +27,7 @@ _FLAT_SHARE = 0.3
 Description = Experiment | RecordDescription
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Run:
     """One run to be played.
 

@@ -2,38 +2,44 @@
 
 from __future__ import annotations
 
-import json
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from gap_diagnosis.outcome.diagnosis import Diagnosis
+from .answers import Answer, Cause
+from .claims import Claim, claims
 
-from .cases import Answer, Effect
-
-NO_EFFECT = ("no_gap", "parameters_only")
-NAMING = ("effect", "ambiguous")
-ABSTAINING = ("unexplained", "nonstationary", "bad_data")
-VISIBLE = 1.0
-"""Relative size below which an effect need not be seen: its detection limit."""
 CLEAR = 3.0
-"""Relative size above which an effect should be named."""
+"""How many times its detection limit, or the remainder, a cause must show to be asked for."""
+CONFIDENT = 0.8
+"""From here on a claim that something is present counts as said for sure."""
+
+_CONSTANT_TORQUE = frozenset(("torque_bias", "asymmetric_friction", "gravity"))
+_LEVEL = 0.95  # |sine| of an angle above which gravity hardly changes around it
+_ANGLES = ("phase_rad", "angle_rad")
 
 
-def indistinguishable(effect: Effect) -> set[str]:
-    """Return the names that say the same as the true one: equivalences known beforehand."""
-    names = {effect.name}
-    constant_torque = {"torque_bias", "asymmetric_friction", "gravity"}
-    angle = effect.catalogue.get("gravity.angle_rad")
-    if (
-        effect.name == "torque_bias"
-        or "asymmetric_friction.coulomb_nm" in effect.catalogue
-        or (angle is not None and abs(math.sin(angle)) > 0.95)
-    ):
-        names |= constant_torque
-    if effect.name == "backlash":
+def indistinguishable(cause: Cause, *, rigid: bool) -> frozenset[str]:
+    """Return the names that say the same as the true one: equivalences known beforehand.
+
+    A constant torque is asymmetric Coulomb friction while sliding, or gravity at right angles;
+    backlash lies within a piecewise stiffness, presliding within LuGre friction; gravity on a rigid
+    axis is cogging of one cycle.
+    """
+    names = {cause.name}
+    angle = cause.parameters.get("gravity.angle_rad")
+    level = angle is not None and abs(math.sin(angle)) > _LEVEL
+    coulomb = "asymmetric_friction.coulomb_nm" in cause.parameters
+    if cause.name == "torque_bias" or coulomb or level:
+        names |= _CONSTANT_TORQUE
+    if cause.name == "backlash":
         names.add("piecewise_stiffness")
-    return names
+    if cause.name == "presliding_friction":
+        names.add("lugre_friction")
+    if cause.name == "gravity" and rigid:
+        names.add("cogging")
+    return frozenset(names)
 
 
 @dataclass(frozen=True)
@@ -44,7 +50,8 @@ class Outcome:
         case: name of the case.
         method: name of the method.
         answer: the truth.
-        diagnosis: what was said; None if the method failed.
+        verdict: what was said; `failed` if nothing.
+        claims: causes that were listed.
         error: why it failed.
         seconds: what it took.
     """
@@ -52,124 +59,114 @@ class Outcome:
     case: str
     method: str
     answer: Answer
-    diagnosis: Diagnosis | None
+    verdict: str
+    claims: tuple[Claim, ...]
     error: str
     seconds: float
 
     @classmethod
-    def of(cls, answer: Answer, values: dict[str, Any]) -> Outcome:
-        """Return the outcome of a verdict file's content."""
-        said = values.get("diagnosis")
-        diagnosis = None if said is None else Diagnosis.from_json(json.dumps(said), values["case"])
+    def of(cls, answer: Answer, line: Mapping[str, Any]) -> Outcome:
+        """Return the outcome of a line of the raw verdicts."""
+        said = line.get("diagnosis")
         return cls(
-            values["case"],
-            values["method"],
+            line["case"],
+            line["method"],
             answer,
-            diagnosis,
-            values.get("error", ""),
-            values["seconds"],
+            said["verdict"] if said else "failed",
+            claims(said) if said else (),
+            line.get("error", ""),
+            float(line["seconds"]),
         )
 
     @property
-    def kind(self) -> str:
-        """Kind of the case."""
-        return self.answer.kind
+    def failed(self) -> bool:
+        """Whether the method gave no verdict."""
+        return self.verdict == "failed"
 
     @property
-    def truth(self) -> tuple[str, ...]:
-        """Names of the true effects."""
-        return tuple(effect.name for effect in self.answer.effects)
+    def named(self) -> tuple[Claim, ...]:
+        """The causes that the verdict names."""
+        return tuple(claim for claim in self.claims if claim.named)
 
     @property
-    def relative(self) -> float:
-        """How far the (least) true effect shows, over what its detection limit shows."""
-        return min((effect.relative for effect in self.answer.effects), default=0.0)
+    def asked(self) -> tuple[Cause, ...]:
+        """True dominant causes that the catalogue lists."""
+        return () if self.answer.kind == "outside" else self.answer.causes
 
     @property
-    def verdict(self) -> str:
-        """What was said; `failed` if nothing."""
-        return self.diagnosis.verdict if self.diagnosis else "failed"
+    def clear(self) -> bool:
+        """Whether every dominant cause shows well enough to be asked for."""
+        closed = self.answer.world == "closed"
+        shown = [c.relative if closed else (c.over_remainder or 0.0) for c in self.asked]
+        return bool(shown) and min(shown) >= CLEAR
+
+    def same(self, cause: Cause) -> frozenset[str]:
+        """Return the names that say the same as a true cause."""
+        return indistinguishable(cause, rigid=math.isinf(self.answer.plant["k0"]))
+
+    def is_right(self, claim: Claim) -> bool:
+        """Tell whether a claim's set holds something that is there, weak as it may be."""
+        return any(claim.names & self.same(cause) for cause in (*self.asked, *self.answer.weak))
 
     @property
-    def named(self) -> tuple[str, ...]:
-        """Effects that were named, best first; none for a verdict that names none."""
-        if self.diagnosis is None or self.verdict not in NAMING:
-            return ()
-        return tuple(self.diagnosis.effects)
+    def wrong_names(self) -> tuple[Claim, ...]:
+        """Claims of something that is not there, for sure."""
+        return tuple(c for c in self.claims if c.present >= CONFIDENT and not self.is_right(c))
 
-    @property
-    def reported(self) -> set[str]:
-        """All effects in the reported sets."""
-        if not self.named or self.diagnosis is None:
-            return set()
-        return {*self.named, *(name for group in self.diagnosis.equivalent for name in group)}
-
-    @property
-    def abstains(self) -> bool:
-        """Whether the verdict says that something is there that has no name."""
-        return self.verdict in ABSTAINING
-
-    @property
-    def first_strict(self) -> bool:
-        """Whether the first name is the true effect."""
-        return self.named[:1] == self.truth[:1] and bool(self.truth)
-
-    @property
-    def first(self) -> bool:
-        """Whether the first name is the true effect or one that says the same."""
-        return bool(self.named) and self.named[0] in indistinguishable(self.answer.effects[0])
-
-    @property
-    def right(self) -> bool:
-        """Whether the verdict as a whole is right: what the confidence speaks of."""
-        said_nothing = self.verdict in NO_EFFECT
-        if self.kind in ("none", "parameters"):
-            return said_nothing
-        if said_nothing:
-            return self.relative < VISIBLE
-        if self.kind == "outside":
-            return self.abstains
-        if self.kind == "nonstationary":
-            return self.verdict == "nonstationary" or self.named == ("nonstationary",)
-        if self.verdict == "ambiguous":
-            return all(indistinguishable(e) & self.reported for e in self.answer.effects)
-        if self.kind == "two":
-            return self.matches == len(self.truth) == len(self.named)
-        return self.first and len(self.named) == 1
+    def found(self, cause: Cause) -> bool:
+        """Tell whether a true cause is named or in the set of one that is."""
+        if cause.name == self.verdict == "nonstationary":
+            return True
+        return any(claim.names & self.same(cause) for claim in self.named)
 
     @property
     def matches(self) -> int:
-        """How many true effects are among the named ones, each name counted once."""
+        """How many dominant causes are among the names, each name counted once."""
         left, found = list(self.named), 0
-        for effect in self.answer.effects:
-            same = next((name for name in left if name in indistinguishable(effect)), None)
+        for cause in self.asked:
+            same = next((claim for claim in left if claim.names & self.same(cause)), None)
             if same is not None:
                 left.remove(same)
                 found += 1
         return found
 
-    def deviations(self) -> tuple[list[float], list[float]]:
-        """Return how far the truth lies from each value: bare parameters, effect parameters.
-
-        In units of the way to the end of the interval on that side, which holds the truth up to 1.
-        Only where the verdict is right, and only of parameters that mean the same in both plants.
-        """
-        if self.diagnosis is None or not self.right or self.abstains:
-            return [], []
-        seen = self.answer.plant_seen(self.named)
-        bare = [self._deviation(name, value) for name, value in seen.items()]
-        known = [
-            self._deviation(name, value)
-            for effect in self.answer.effects
-            if effect.name in self.named
-            for name, value in effect.catalogue.items()
+    @property
+    def said(self) -> int:
+        """How many causes are named, true weak ones of the remainder left out."""
+        beside = [
+            claim
+            for claim in self.named
+            if not any(claim.names & self.same(cause) for cause in self.asked)
+            and self.is_right(claim)
         ]
-        return [b for b in bare if b is not None], [k for k in known if k is not None]
+        return len(self.named) - len(beside)
 
-    def _deviation(self, name: str, value: float) -> float | None:
-        estimate = self.diagnosis.parameters.get(name) if self.diagnosis else None
-        if estimate is None or not estimate.low < estimate.high:
-            return None
-        end = estimate.high if value > estimate.value else estimate.low
-        off, reach = abs(value - estimate.value), abs(end - estimate.value)
-        return off / reach if reach else math.inf if off else 0.0
+    @property
+    def right(self) -> bool:
+        """Whether exactly the dominant causes are named, and nothing that is not there."""
+        if self.failed:
+            return False
+        if self.asked and all(self.found(cause) for cause in self.asked):
+            return self.matches == self.said or self.verdict == "nonstationary"
+        return not self.asked and self.said == 0
+
+    def covered(self) -> list[bool]:
+        """Tell of each parameter of rightly named causes whether its interval holds the truth.
+
+        Only of parameters that mean the same in both plants; angles are compared modulo a turn.
+        """
+        found = []
+        for cause in self.asked:
+            for claim in self.named:
+                if claim.effect != cause.name:
+                    continue
+                for name, truth in cause.parameters.items():
+                    if name in claim.parameters:
+                        found.append(_holds(claim.parameters[name], truth, name))
+        return found
+
+
+def _holds(interval: tuple[float, float, float], truth: float, name: str) -> bool:
+    _, low, high = interval
+    turns = (-1, 0, 1) if name.endswith(_ANGLES) else (0,)
+    return any(low <= truth + turn * 2.0 * math.pi <= high for turn in turns)

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.signal import lfilter
 
-from .causes import Draw, Drawer, Scales, linear
+from .draw import Draw, Drawer, Scales, linear
 from .rigs import log_uniform
 
 SCATTER = (0.01, 0.05)
@@ -50,7 +50,7 @@ def _bending(_: np.random.Generator, at: Scales) -> Draw:
 
 
 def _interpolation(rng: np.random.Generator, at: Scales) -> Draw:
-    shape = {"interpolation_cycles": round(log_uniform(rng, 10.0, 100.0) / at.angle)}
+    shape = {"interpolation_cycles": float(round(log_uniform(rng, 10.0, 100.0) / at.angle))}
     return linear("encoder_interpolation", {"interpolation_rad": at.angle}, 2e-3, 0.05, shape)
 
 

@@ -1,56 +1,65 @@
-"""The report of a blind check: Markdown and figures in one folder, every miss with its truth."""
+"""The report of a blind check, from its raw verdicts and answers: Markdown, scores, figures."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
-
-import numpy as np
 
 from fjr_kit.atomic import write_whole
 from fjr_kit.errors import InputError
 
-from .cases import NOMINAL, Answer
-from .check import BlindCheck
+from .answers import WORLDS, Answer, World
+from .check import BlindCheck, Unsealed
 from .figures import draw_all
-from .files import case_name, read_json
-from .outcome import ABSTAINING, CLEAR, NO_EFFECT, VISIBLE, Outcome
-from .score import CONFIDENT, TARGETS, MethodScores, Score, all_scores, met
+from .frozen import frozen_digest
+from .outcome import CLEAR, CONFIDENT, Outcome
+from .score import TARGETS, Score, Scores, all_scores, met, rate
 
 _TITLES = {
-    "false_alarm": "effect named where there is none",
-    "abstained_without_effect": "abstained where there is no effect",
-    "first_right_clear": f"right effect first, above {CLEAR:g} x the detection limit",
-    "first_right_clear_strict": "the same, without the equivalences known beforehand",
-    "in_set_clear": "true effect in the reported set, same cases",
-    "set_size_median": "median size of that set",
-    "two_effects_f1": "two effects: F1 of the names",
-    "outside_abstained": "outside the catalogue: abstained",
-    "outside_confident_name": f"outside: named with confidence >= {CONFIDENT:g}",
-    "nonstationary_found": "drift found",
-    "gap_closed_median": "median of the gap closed, right effects",
-    "calibration_error": "expected calibration error",
-    "coverage_bare": "95 % intervals hold the bare parameters",
-    "coverage_effect": "95 % intervals hold the effect's parameters",
-    "verdict_right": "verdict right, all cases",
-    "seconds_median": "median time of one case (s)",
+    "wrong_name": f"wrong name at present >= {CONFIDENT:g}, per case",
+    "dominant_named": f"dominant cause named or in its set, above {CLEAR:g} x limit or remainder",
+    "two_causes_f1": "two causes: F1",
+    "nothing_named": "nothing named where no dominant cause is",
+    "outside_not_named": "nothing named where the dominant cause is in no catalogue",
+    "interval_holds": "effect's 95 % interval holds the truth",
+    "auroc_present": "AUROC of present, right against wrong",
+    "verdict_right": "exactly the dominant causes named",
+    "failed": "failed",
+    "seconds_median": "median time of one case in one thread (s)",
 }
-_COUNTS = {"set_size_median", "seconds_median"}
+_PLAIN = {"seconds_median", "auroc_present"}
+
+_MEANT = (
+    f"Relative to its *detection limit* a cause shows as much as its change of the position leaves "
+    "after a linear refit of the bare parameters, over three times the floor (rms over the DFT "
+    "lines up to the highest excited, at the level where it shows best); the floor is the noise of "
+    "what was averaged and 0.1 % of the signal. Over the *remainder* it shows as much as the "
+    "change that leaving it out makes, beside all else, over the change that leaving all of the "
+    f"remainder out makes, both after the same refit. A closed world's cause is asked for above "
+    f"{CLEAR:g} x its detection limit, the other worlds' above {CLEAR:g} x the remainder. A name "
+    "is *wrong* if neither it nor its set holds a true cause, weak ones of the remainder "
+    "included. In the F1 true weak causes that are named count neither way. A constant torque "
+    "passes for asymmetric Coulomb friction, bias, or gravity at right angles; backlash for the "
+    "piecewise stiffness that contains it, presliding friction for the LuGre friction that "
+    "contains it; gravity on a rigid axis for cogging. A diagnosis that fails is a miss of all "
+    "that is asked. Intervals are of 95 %: Clopper-Pearson for shares of cases, else bootstrap "
+    "over cases."
+)
 
 
-def score_check(check: BlindCheck) -> Path:
+def score_check(check: BlindCheck, *, unfinished: bool = False) -> Path:
     """Unseal the answers if that is still to be done; write scores and report; return the report.
 
     Raises:
         InputError: verdicts are missing, or something was changed.
     """
-    answers = check.unseal()
-    outcomes = [
-        Outcome.of(answers[index], values) for (_, index), values in check.read_verdicts().items()
-    ]
-    seed = read_json(check.folder / "answers.json")["seed"]
-    return _write(check, outcomes, seed, _report_folder(check))
+    answers = dict(check.unseal(unfinished=unfinished))
+    lines = [line for line in check.verdicts() if line["case"] in answers]
+    outcomes = [Outcome.of(answers[line["case"]], line) for line in lines]
+    opened = Unsealed.read(check.folder / "unsealed.json")
+    return _write(check, outcomes, f"seed {opened.seed}", _report_folder(check))
 
 
 def rehearse_report(check: BlindCheck) -> None:
@@ -62,16 +71,26 @@ def rehearse_report(check: BlindCheck) -> None:
     Raises:
         InputError: the report's folder cannot be written, or the check's manifest is damaged.
     """
-    nothing = Answer("none", [], NOMINAL, 0.0)
+    nothing = {"plant": {"k0": 1.0}, "nominal": {}, "settings": {}, "facts": {}}
+    truth = {"causes": [], "weak": [], "laws": [], "noise_rad": 0.0, "scatter": 0.0,
+             "remainder": 0.0, "excitation": "none", "controller_known": True}  # fmt: skip
     outcomes = [
-        Outcome(case_name(index), method, nothing, None, "not yet diagnosed", 0.0)
-        for method in check.methods
-        for index in range(check.count)
+        Outcome(
+            case.name,
+            method,
+            Answer.from_json({**nothing, **truth, "world": case.world, "kind": "none"}),
+            "failed",
+            (),
+            "not yet diagnosed",
+            0.0,
+        )
+        for method in check.manifest.methods
+        for case in check.cases[:10]
     ]
     folder = _report_folder(check)
     try:
         with TemporaryDirectory(prefix=".rehearsal-", dir=folder) as place:
-            _write(check, outcomes, 0, Path(place))
+            _write(check, outcomes, "a rehearsal", Path(place))
     except OSError as error:
         raise InputError(
             f"{folder}, where the report will go, cannot be written: {error.strerror}; make room "
@@ -91,167 +110,181 @@ def _report_folder(check: BlindCheck) -> Path:
     return folder
 
 
-def _write(check: BlindCheck, outcomes: Sequence[Outcome], seed: int, folder: Path) -> Path:
+def _write(check: BlindCheck, outcomes: Sequence[Outcome], origin: str, folder: Path) -> Path:
     """Write scores, figures and text into a folder; return the text's path."""
-    found = all_scores(outcomes, check.methods)
+    found = all_scores(outcomes, check.manifest.methods, frozen_digest())
     write_whole(folder / "scores.json", found.to_json())
-    scored = found.methods
-    draw_all(scored, outcomes, folder)
+    ours = [o for o in outcomes if o.method == check.manifest.methods[0]]
+    draw_all(ours, folder)
     report = folder / "report.md"
-    write_whole(report, _text(check, scored, outcomes, seed))
+    write_whole(report, "\n".join(_text(check, found, outcomes, ours, origin)) + "\n")
     return report
 
 
 def _text(
-    check: BlindCheck, scored: Mapping[str, MethodScores], outcomes: Sequence[Outcome], seed: int
-) -> str:
-    ours = [o for o in outcomes if o.method == check.methods[0]]
-    parts = [
+    check: BlindCheck,
+    found: Scores,
+    outcomes: Sequence[Outcome],
+    ours: Sequence[Outcome],
+    origin: str,
+) -> list[str]:
+    manifest = check.manifest
+    planned, seen = len(check.cases), len(ours)
+    changed = "" if found.frozen == manifest.frozen else (
+        f" **The sources that score are others now: {found.frozen[:16]}.**"
+    )  # fmt: skip
+    ended = "" if seen == planned else f" The check was ended after {seen} of {planned} cases."
+    return [
         "# Blind check",
         "",
-        f"{check.count} {'case' if check.count == 1 else 'cases'}, seed {seed}, made by a second "
-        f"plant that shares nothing with the simulated rig; version {check.version}. The "
-        "SHA-256 of every answer was written down before the first diagnosis "
-        "(`commitments.json`), that of every verdict before the first answer was unsealed "
-        "(`verdicts.json`). Who knows the seed can make the cases again: the seal "
-        "guards against accident and later change, not against a user who breaks it.",
+        f"{seen} {'case' if seen == 1 else 'cases'}, {origin}, made by a second plant that shares "
+        f"nothing with the simulated rig; version {manifest.version}.{ended} How cases are made "
+        f"and scored was frozen as {manifest.frozen[:16]} before the first.{changed} The SHA-256 "
+        "of every answer was written down before the case was diagnosed, that of all verdicts "
+        "before the first answer was unsealed. Who knows the seed can make the cases again: the "
+        "seal guards against accident and later change, not against a user who breaks it.",
         "",
-        *_what_is_meant(),
-        "## Scores",
+        _MEANT,
         "",
-        *_table(scored),
+        *(line for world in WORLDS for line in _world(world, found)),
+        "![named over size](named.png)",
         "",
-        "![accuracy over size](accuracy.png)",
+        "![is what is said to be present there?](present.png)",
         "",
-        "## By size",
-        "",
-        *_sizes(scored),
-        "",
-        "## Calibration",
-        "",
-        "![calibration](calibration.png)",
-        "",
-        "## What was taken for what",
-        "",
-        f"Method {check.methods[0]}; single effects above their detection limit.",
-        "",
-        "![confusion](confusion.png)",
-        "",
+        *_shares("By cause", ours, lambda o: [cause.name for cause in o.asked]),
+        *_shares("By excitation", ours, lambda o: [f"{o.answer.world}, {o.answer.excitation}"]),
+        *_shares(
+            "By what is known of the controller",
+            [o for o in ours if o.answer.world == "records"],
+            lambda o: ["known" if o.answer.controller_known else "unknown"],
+        ),
         *_misses(ours),
         *_failures(outcomes),
     ]
-    return "\n".join(parts) + "\n"
 
 
-def _what_is_meant() -> list[str]:
-    return [
-        "The detection limit of an effect is the size at which the steady position changes, after "
-        "a refit of the bare parameters, by three times the floor (rms over the DFT "
-        "lines up to the highest excited one, at the level where it shows best); the floor is the "
-        "noise of the mean over periods and 0.1 % of the signal. Relative size is that change "
-        "over the one at the detection limit. A verdict is right if it names the true effects "
-        "and no other (an ambiguous one: if its sets hold them); without an effect, if it names "
-        "none; outside the catalogue, if it abstains; for drift, if it says so. "
-        f"Below {VISIBLE:g} x the detection limit it is also right to see no effect. A constant "
-        "torque passes for asymmetric Coulomb friction, bias, or gravity at right angles; backlash "
-        "passes for the piecewise stiffness that contains it. Intervals are of 95 %: "
-        "Clopper-Pearson for shares of cases, else bootstrap over cases.",
-        "",
-    ]
-
-
-def _table(scored: Mapping[str, MethodScores]) -> list[str]:
+def _world(world: World, found: Scores) -> list[str]:
+    """Return the table of one world: scores as rows, methods as columns."""
+    methods = {name: worlds[world] for name, worlds in found.methods.items() if world in worlds}
+    if not methods:
+        return []
     lines = [
-        "| | target | " + " | ".join(scored) + " |",
-        "|---|---|" + "---|" * len(scored),
+        f"## World: {world}",
+        "",
+        "| | target | " + " | ".join(methods) + " |",
+        "|---|---|" + "---|" * len(methods),
     ]
     for name, title in _TITLES.items():
-        cells = [_cell(name, result.scores[name]) for result in scored.values()]
-        lines.append(f"| {title} | {_target(name)} | " + " | ".join(cells) + " |")
-    return lines
+        if any(scores[name].cases for scores in methods.values()):
+            cells = [_cell(name, world, scores[name]) for scores in methods.values()]
+            lines.append(f"| {title} | {_target(name, world)} | " + " | ".join(cells) + " |")
+    return [*lines, ""]
 
 
-def _target(name: str) -> str:
-    if name not in TARGETS:
+def _target(name: str, world: World) -> str:
+    target = TARGETS.get(name, {}).get(world)
+    if target is None:
         return ""
-    sense, bound = TARGETS[name]
+    sense, bound = target
     if isinstance(bound, tuple):
         return f"{_number(name, bound[0])} .. {_number(name, bound[1])}"
     return f"{sense} {_number(name, bound)}"
 
 
-def _number(name: str, value: float) -> str:
-    return f"{value:.3g}" if name in _COUNTS else f"{100.0 * value:.3g} %"
-
-
-def _cell(name: str, score: Score) -> str:
-    if score.value is None or score.low is None or score.high is None:
+def _cell(name: str, world: World, score: Score) -> str:
+    if score.value is None:
         return "-"
-    low, high = _number(name, score.low), _number(name, score.high)
-    verdict = {True: " met", False: " **missed**", None: ""}[met(name, score.value)]
-    return f"{_number(name, score.value)} [{low}, {high}] n={score.cases}{verdict}"
+    numbers = [_number(name, part) for part in (score.value, score.low, score.high)]
+    verdict = {True: " met", False: " **missed**", None: ""}[met(name, world, score.value)]
+    return f"{numbers[0]} [{numbers[1]}, {numbers[2]}] n={score.cases}{verdict}"
 
 
-def _sizes(scored: Mapping[str, MethodScores]) -> list[str]:
-    lines = ["| method | relative size | right first | wrong name | no effect seen | cases |",
-             "|---|---|---|---|---|---|"]  # fmt: skip
-    for method, result in scored.items():
-        for row in result.by_size:
-            if not row.first_right.cases:
-                continue
-            band = f"{row.low:g} .. {row.high:g}" if row.high else f"> {row.low:g}"
-            cells = " | ".join(map(_share, (row.first_right, row.wrong_name, row.said_nothing)))
-            lines.append(f"| {method} | {band} | {cells} | {row.first_right.cases} |")
-    return lines
+def _number(name: str, value: float | None) -> str:
+    if value is None:
+        return "-"
+    return f"{value:.3g}" if name in _PLAIN else f"{100.0 * value:.3g} %"
 
 
-def _share(score: Score) -> str:
-    value, low, high = np.array([score.value, score.low, score.high], float) * 100.0
-    return f"{value:.0f} % [{low:.0f}, {high:.0f}]"
-
-
-def _misses(outcomes: Sequence[Outcome]) -> list[str]:
-    """Return every wrong verdict of the project's own method, and what is true instead."""
-    wrong = [o for o in outcomes if not o.right]
-    if not wrong:
-        return [f"## Misses: none of {len(outcomes)}", ""]
-    lines = [f"## Misses: {len(wrong)} of {len(outcomes)}", "",
-             "| case | kind | true | relative size | noise (rad) | said | confidence | miss |",
-             "|---|---|---|---|---|---|---|---|"]  # fmt: skip
-    for outcome in wrong:
-        answer = outcome.answer
-        truth = " + ".join(f"{e.name} ({e.size:.3g})" for e in answer.effects) or "no effect"
-        relative = ", ".join(f"{e.relative:.2g}" for e in answer.effects) or "-"
-        said = outcome.verdict + (": " + " + ".join(outcome.named) if outcome.named else "")
-        others = sorted(outcome.reported - set(outcome.named))
-        said += f" (or {', '.join(others)})" if others else ""
-        confidence = f"{outcome.diagnosis.confidence:.2f}" if outcome.diagnosis else "-"
-        lines.append(
-            f"| {outcome.case} | {outcome.kind} | {truth} | {relative} | {answer.noise_rad:.1e} | "
-            f"{said} | {confidence} | {_sort(outcome)} |"
+def _shares(
+    title: str, outcomes: Sequence[Outcome], groups: Callable[[Outcome], Iterable[str]]
+) -> list[str]:
+    """Return how many clear causes were found in each group of cases, and its wrong names."""
+    asked: dict[str, list[bool]] = {}
+    wrong: Counter[str] = Counter()
+    for outcome in outcomes:
+        for name in dict.fromkeys(groups(outcome)):
+            wrong[name] += bool(outcome.wrong_names)
+            causes = [c for c in outcome.asked if title != "By cause" or c.name == name]
+            found = [outcome.found(cause) for cause in causes] if outcome.clear else []
+            asked.setdefault(name, []).extend(found)
+    if not asked:
+        return []
+    lines = [f"## {title}", "", "| | clear causes found | wrong names |", "|---|---|---|"]
+    for name, hits in sorted(asked.items()):
+        share = rate(hits)
+        said = f"{sum(hits)} of {len(hits)}" + (
+            f" [{100.0 * (share.low or 0.0):.0f}, {100.0 * (share.high or 0.0):.0f}] %"
+            if hits
+            else ""
         )
+        lines.append(f"| {name} | {said} | {wrong[name]} |")
     return [*lines, ""]
 
 
+def _misses(outcomes: Sequence[Outcome]) -> list[str]:
+    """Return a table of the cases that count against a target."""
+    missed = [(o, sort) for o in outcomes if (sort := _sort(o))]
+    if not missed:
+        return [f"## Misses: none of {len(outcomes)}", ""]
+    lines = [f"## Misses: {len(missed)} of {len(outcomes)}", "",
+             "| case | true | shows | noise, remainder | said | miss |",
+             "|---|---|---|---|---|---|"]  # fmt: skip
+    lines += [_miss(outcome, sort) for outcome, sort in missed]
+    return [*lines, ""]
+
+
+def _miss(outcome: Outcome, sort: str) -> str:
+    answer = outcome.answer
+    truth = " + ".join(cause.name for cause in answer.causes) or "no dominant cause"
+    beside = [*(cause.name for cause in answer.weak), *answer.laws]
+    truth += f" (beside {', '.join(beside)})" if beside else ""
+    shown = [c.relative if c.over_remainder is None else c.over_remainder for c in answer.causes]
+    said = "; ".join(
+        f"{claim.effect} {claim.present:.2f}{'' if claim.named else ' (not named)'}"
+        for claim in outcome.claims
+        if claim.named or claim.present >= CONFIDENT
+    )
+    noise = answer.facts.get("noise_db", 0.0)
+    return (
+        f"| {outcome.case} | {truth} | {', '.join(f'{s:.2g} x' for s in shown) or '-'} | "
+        f"{noise:.0f} dB, {100.0 * answer.remainder:.2g} % | "
+        f"{outcome.verdict}{': ' if said else ''}{said} | {sort} |"
+    )
+
+
 def _sort(outcome: Outcome) -> str:
-    """Return in words what kind of miss it is."""
-    if outcome.diagnosis is None:
+    """Return in words what kind of miss it is; empty for none."""
+    if outcome.failed:
         return "failed"
-    if outcome.kind in ("none", "parameters"):
-        return "false alarm" if outcome.named else "abstained without cause"
-    if outcome.verdict in NO_EFFECT:
-        return "not seen"
-    if outcome.verdict in ABSTAINING:
-        return "abstained" if outcome.kind != "nonstationary" else "drift not recognised"
-    if outcome.kind in ("single", "two") and 0 < outcome.matches < max(
-        len(outcome.named), len(outcome.truth)
-    ):
-        return "partly right"
-    return "wrong name"
+    if outcome.wrong_names:
+        return "wrong name"
+    if not outcome.asked:
+        return "named, not surely" if outcome.said else ""
+    if outcome.clear and not all(outcome.found(cause) for cause in outcome.asked):
+        return "partly found" if outcome.matches else "not found"
+    return ""
 
 
 def _failures(outcomes: Sequence[Outcome]) -> list[str]:
-    failed = [o for o in outcomes if o.diagnosis is None]
+    failed: dict[tuple[str, str], list[str]] = {}
+    for outcome in outcomes:
+        if outcome.failed:
+            failed.setdefault((outcome.method, outcome.error), []).append(outcome.case)
     if not failed:
         return []
-    return ["## Failures", "", *(f"- {o.method} on {o.case}: {o.error}" for o in failed), ""]
+    lines = [
+        f"- {method}, {len(cases)} cases ({', '.join(cases[:3])}{', ...' if len(cases) > 3 else ''}"
+        f"): {error}"
+        for (method, error), cases in failed.items()
+    ]
+    return ["## Failures", "", *lines, ""]

@@ -7,11 +7,13 @@ diagnosis runs. The cipher is a keyed SHAKE-256 stream with an HMAC over nonce a
 
 from __future__ import annotations
 
+import base64
 import hashlib
 import hmac
 import json
 import os
 import secrets
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -29,6 +31,25 @@ def digest(data: bytes) -> str:
 def salted(answer: dict[str, Any]) -> bytes:
     """Return an answer as JSON bytes with a random salt."""
     return json.dumps({"salt": secrets.token_hex(16), **answer}, sort_keys=True).encode()
+
+
+def sealed_line(case: str, answer: dict[str, Any], key: bytes) -> dict[str, str]:
+    """Return what is written down of an answer before any method sees the case."""
+    text = salted(answer)
+    sealed = base64.b64encode(encrypt(text, key)).decode()
+    return {"case": case, "sha256": digest(text), "sealed": sealed}
+
+
+def opened_line(line: Mapping[str, str], key: bytes) -> dict[str, Any]:
+    """Return the answer of a sealed line; raise InputError if it is not what was sealed."""
+    text = decrypt(base64.b64decode(line["sealed"]), key, f"The answer of {line['case']}")
+    if digest(text) != line["sha256"]:
+        raise InputError(
+            f"The answer of {line['case']} is not what was committed to; begin a new check."
+        )
+    answer = json.loads(text)
+    answer.pop("salt")
+    return {"case": line["case"], **answer}
 
 
 def encrypt(data: bytes, key: bytes) -> bytes:

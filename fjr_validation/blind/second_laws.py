@@ -44,7 +44,7 @@ SETTINGS: tuple[str, ...] = (
     "mode_kg_m2", "mode_hz", "mode_damping_ratio",
     "gravity_nm", "gravity_angle_rad",
     "cogging_nm", "cogging_cycles", "cogging_phase_rad",
-    "delay_s", "lag_s", "limit_nm", "gain_error", "resolution_rad",
+    "delay_s", "lag_s", "limit_nm", "resolution_rad",
     "eccentricity_rad", "eccentricity_phase_rad", "drift_relative", "drift_time_s",
     "slew_nm_s", "deadband_nm", "stiffness_asymmetry",
     "ripple_relative", "ripple_cycles", "ripple_phase_rad",
@@ -60,7 +60,7 @@ SETTINGS: tuple[str, ...] = (
     STRIBECK_M, STRIBECK_MV, STRIBECK_L, STRIBECK_LV, ASYM_C, ASYM_V, BIAS, GMS_M, GMS_L, LOAD,
     FRICTION_ANGLE, FRICTION_CYCLES, FRICTION_PHASE, DRAG_M, DRAG_L, GAP, ZONE, SOFT,
     HYST, HYST_RAD, FLEX_DAMPING, KIN, KIN_CYCLES, KIN_PHASE, MODE, MODE_HZ, MODE_DAMPING,
-    GRAVITY, GRAVITY_ANGLE, COG, COG_CYCLES, COG_PHASE, DELAY, LAG, LIMIT, GAIN, RESOLUTION,
+    GRAVITY, GRAVITY_ANGLE, COG, COG_CYCLES, COG_PHASE, DELAY, LAG, LIMIT, RESOLUTION,
     ECC, ECC_PHASE, DRIFT, DRIFT_TIME, SLEW, DEADBAND, K_ASYM, RIPPLE, RIPPLE_CYCLES, RIPPLE_PHASE,
     LOSS_FORWARD, LOSS_BACKWARD, STALL, NO_LOAD, EYRING, EYRING_V, EDDY, EDDY_V,
     CABLE, CABLE_TIME, CUSHION, CUSHION_RAD, HEATING, HEATING_NM, HEATING_TIME, BENDING,
@@ -161,12 +161,12 @@ def impulse(inertia, v, force, viscous, level_plus, level_minus, h):
 
 @part
 def drive(u, s):
-    """Return what the drive makes of a command (N m): dead band, rounded limit, gain."""
+    """Return what the drive makes of a command (N m): dead band, rounded limit."""
     if s[DEADBAND] != 0.0:
         u -= min(max(u, -s[DEADBAND]), s[DEADBAND])
     if s[LIMIT] != 0.0:
         u /= (1.0 + abs(u / s[LIMIT]) ** 16) ** 0.0625
-    return u * (1.0 + s[GAIN])
+    return u
 
 
 @part

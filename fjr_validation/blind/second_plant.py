@@ -20,7 +20,7 @@ from . import second_laws as law
 from .second_compiled import compiled, part
 
 _RING = 4096
-_SHAFT_TIME = 2e-5  # s, damping over stiffness of the shaft behind a gap
+_SHAFT_TIME = 5e-6  # s, damping over stiffness of the shaft behind a gap
 
 (
     Q, V, TH, W, TIME, GAP, FLEX, SOLID, MODE_X, MODE_V, CABLE, HEAT,
@@ -56,7 +56,7 @@ def _motor_torque(x, torque, thm, s, h):
         most = s[law.SLEW] * h
         before = x[SLEWED]
         x[SLEWED] += min(max(torque - before, -most), most)
-        torque = 0.5 * (before + x[SLEWED])
+        torque = torque if x[SLEWED] == torque else 0.5 * (before + x[SLEWED])
     if s[law.LAG] != 0.0:
         phase, before = 2.0 * h / s[law.LAG], x[LAG_SECOND]
         first, second = x[LAG_FIRST] - torque, before - torque

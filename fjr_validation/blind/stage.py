@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from .causes import Scales
+from .draw import Scales
 from .excitations import Excitation, Run, draw_multisine, draw_records
 from .remainders import scattered, wandering
 from .rigs import Rig, draw_rig, log_uniform
@@ -75,14 +75,16 @@ class Stage:
             noisy: whether it is recorded: with noise and with the full rate of fine steps.
         """
         index = self.excitation.runs.index(run)
-        rng = np.random.default_rng([*self.seed, index])
+        friction, noise_of, wander_of, jitter_of = (
+            np.random.default_rng([*self.seed, index, part]) for part in range(4)
+        )
         own = {name: settings.get(name, value) for name, value in plant.items()}
-        own = scattered(own, scatter, rng)
+        own = scattered(own, scatter, friction)
         rest = {name: value for name, value in settings.items() if name not in plant}
         samples, rate = run.reference.size, self.rig.loop.sample_rate_hz
-        noise = self.noise_rad * rng.standard_normal(samples) if noisy else None
-        wander = wandering(rng, samples, rate, self.wander_s) if "wander_nm" in rest else None
-        jitter = rng.standard_normal(samples) if "jitter_s" in rest else None
+        noise = self.noise_rad * noise_of.standard_normal(samples) if noisy else None
+        wander = wandering(wander_of, samples, rate, self.wander_s) if "wander_nm" in rest else None
+        jitter = jitter_of.standard_normal(samples) if "jitter_s" in rest else None
         play = Play(
             self.rig.loop,
             Chance(noise, wander, jitter),

@@ -24,7 +24,8 @@ from fjr_interface.bags.writer import BagWriter
 from fjr_kit.atomic import new_folder, write_whole
 
 from .answers import WORLDS, Answer, Cause, Kind, World
-from .causes import Draw, compatible, drawers
+from .causes import compatible, drawers
+from .draw import Draw
 from .remainders import SCATTER, laws
 from .rigs import log_uniform
 from .stage import Stage, Unsuitable, datasheet, draw_stage, without

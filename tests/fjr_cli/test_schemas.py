@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 
 from fjr_cli.schemas import DOCUMENTS, schemas
-from fjr_validation.blind.score import Scores
 
 DOCS = Path(__file__).parents[2] / "docs"
 
@@ -37,8 +36,3 @@ def test_the_schema_shows_units():
     assert level["torque_peak_nm"]["unit"] == "N m"
     assert bla["g"]["properties"]["unit"]["const"] == "rad/(N m)"
     assert set(bla["g"]["required"]) == {"unit", "re", "im"}
-
-
-def test_the_published_scores_are_read():
-    found = Scores.read(DOCS / "blind" / "scores.json")
-    assert all("verdict_right" in method.scores for method in found.methods.values())

@@ -102,7 +102,7 @@ def test_a_package_imports_nothing_that_was_not_asked_for():
         "print(sorted({'numpy', 'scipy', 'numba', 'rclpy'} & set(sys.modules)))\n"
         "gap_diagnosis.Diagnosis\n"
         "print('gap_diagnosis.investigation' in sys.modules)\n"
-        "import fjr_validation.blind.maker\n"
+        "import fjr_validation.blind.making\n"
         "import controller_node.node, excitation_node.node, fjr_sim_node.node\n"
         "print(sorted(m for m in sys.modules if m.startswith(('bla_analyzer.', 'fjr_records.'))))\n"
         "print(sorted(m for m in sys.modules if m.startswith('gap_diagnosis.')))\n"

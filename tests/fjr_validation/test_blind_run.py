@@ -2,7 +2,11 @@
 
 import json
 import os
+import signal
 import stat
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -10,16 +14,16 @@ from typer.testing import CliRunner
 
 from fjr_cli.app import app
 from fjr_kit.errors import InputError
-from fjr_validation.blind.check import BlindCheck
-from fjr_validation.blind.files import sealed_file, verdict_file
-from fjr_validation.blind.methods import verdict
+from fjr_validation.blind import check as blind_check
+from fjr_validation.blind.check import BlindCheck, split
+from fjr_validation.blind.frozen import FROZEN, frozen_digest
+from fjr_validation.blind.json_lines import JsonLines
+from fjr_validation.blind.methods import METHODS, verdict
 from fjr_validation.blind.report import score_check
 from fjr_validation.blind.score import Scores
-from fjr_validation.blind.seal import Secret, decrypt, digest, encrypt, salted
+from fjr_validation.blind.seal import Secret, decrypt, encrypt, opened_line, sealed_line
 
-pytestmark = pytest.mark.slow
-
-CASES, SEED = 2, 11
+SEED, CASES = 203, {"closed": 2}
 
 
 @pytest.fixture(scope="module")
@@ -34,36 +38,49 @@ def state(tmp_path_factory):
         os.environ["XDG_STATE_HOME"] = before
 
 
-@pytest.fixture(scope="module")
-def sealed(state, tmp_path_factory) -> BlindCheck:
-    """A check whose cases are made and diagnosed, still sealed."""
-    folder = tmp_path_factory.mktemp("check") / "blind"
-    check = BlindCheck.begin(folder, CASES, SEED, ["refit"])
-    said: list[str] = []
-    check.make_cases(lambda done, total, what: said.append(f"{done}/{total} {what}"))
-    assert sorted(line.split()[1] for line in said) == ["case_000", "case_001"]
-    check.diagnose(workers=1)
-    return check
+def begun(tmp_path: Path, cases: dict[str, int] | None = None) -> BlindCheck:
+    return BlindCheck.begin(tmp_path / "blind", cases or CASES, SEED, ["refit"])
 
 
-@pytest.fixture(scope="module")
-def unsealed(sealed) -> BlindCheck:
-    before_unsealing(sealed)
-    score_check(sealed)
-    return sealed
+def fill(check: BlindCheck, names: list[str]) -> None:
+    """Write sealed answers and verdicts of cases as a run would, without any simulation."""
+    key = Secret.load(check.manifest.check).key
+    truth = {
+        "kind": "none", "causes": [], "weak": [], "laws": [], "plant": {"k0": "inf"},
+        "nominal": {}, "settings": {}, "noise_rad": 0.0, "scatter": 0.0, "remainder": 0.0,
+        "excitation": "multisine", "controller_known": True, "facts": {},
+    }  # fmt: skip
+    for name in names:
+        answer = {**truth, "world": name.split("_")[0]}
+        JsonLines(check.folder / "sealed.jsonl").append(sealed_line(name, answer, key))
+        diagnosis = {"verdict": "parameters_only", "effects": [], "confidence": 0.9}
+        line = {"case": name, "method": "refit", "seconds": 1.0, "diagnosis": diagnosis}
+        JsonLines(check.folder / "verdicts.jsonl").append(line)
 
 
-def before_unsealing(check: BlindCheck) -> None:
-    """What must hold while answers are sealed; called before any test unseals them."""
-    secret = Secret.load(check.check)
-    for file in check.folder.rglob("*"):
-        if file.is_file() and file.suffix != ".mcap":
-            data = file.read_bytes()
-            assert b'"kind": "' not in data or b"pd_filtered" in data, file
-            assert secret.key.hex().encode() not in data, file
-    manifest = json.loads((check.folder / "blind.json").read_text())
-    assert "seed" not in manifest
-    assert not (check.folder / "answers.json").exists()
+def test_lines_survive_a_kill_in_the_middle_of_one(tmp_path):
+    lines = JsonLines(tmp_path / "raw.jsonl")
+    assert lines.read() == []
+    lines.append({"case": 1}, {"case": 2})
+    with lines.path.open("ab") as file:
+        file.write(b'{"case": 3, "verd')
+    assert lines.read() == [{"case": 1}, {"case": 2}]
+    lines.append({"case": 4})
+    assert lines.read() == [{"case": 1}, {"case": 2}, {"case": 4}]
+    assert lines.path.read_bytes().count(b"\n") == 3
+
+
+def test_a_damaged_line_is_named(tmp_path):
+    (tmp_path / "raw.jsonl").write_text('{"case": 1}\nnonsense\n{"case": 2}\n')
+    with pytest.raises(InputError, match="line 2"):
+        JsonLines(tmp_path / "raw.jsonl").read()
+
+
+def test_cases_are_split_among_worlds_and_mixed(state, tmp_path):
+    assert split(10, ["closed", "open", "records"]) == {"closed": 4, "open": 3, "records": 3}
+    check = begun(tmp_path, split(30, ["closed", "open", "records"]))
+    assert len({case.name for case in check.cases}) == 30
+    assert {case.world for case in check.cases[:3]} == {"closed", "open", "records"}
 
 
 def test_sealing_is_undone_by_the_key_only():
@@ -73,160 +90,99 @@ def test_sealing_is_undone_by_the_key_only():
     assert decrypt(sealed, secret.key, "a seal") == b"backlash"
     with pytest.raises(InputError, match="a seal does not open"):
         decrypt(sealed, Secret.draw(None).key, "a seal")
-    with pytest.raises(InputError, match="changed"):
-        decrypt(sealed[:-1] + bytes([sealed[-1] ^ 1]), secret.key, "a seal")
+    line = sealed_line("open_0001", {"kind": "none"}, secret.key)
+    assert opened_line(line, secret.key) == {"case": "open_0001", "kind": "none"}
+    assert line["sha256"] != sealed_line("open_0001", {"kind": "none"}, secret.key)["sha256"]
+    with pytest.raises(InputError, match="open_0001 is not what was committed to"):
+        opened_line({**line, "sha256": "0" * 64}, secret.key)
 
 
-def test_equal_answers_have_different_digests():
-    assert digest(salted({"kind": "none"})) != digest(salted({"kind": "none"}))
-
-
-def test_the_key_is_kept_outside_and_for_its_owner(state, sealed):
-    file = state / "fjr_rig" / "blind" / f"{sealed.check}.json"
+def test_the_key_is_kept_outside_and_for_its_owner(state, tmp_path):
+    check = begun(tmp_path)
+    file = state / "fjr_rig" / "blind" / f"{check.manifest.check}.json"
     assert stat.S_IMODE(file.stat().st_mode) == 0o600
+    assert "seed" not in json.loads((check.folder / "blind.json").read_text())
 
 
-def test_a_seed_nobody_gave_is_drawn():
-    assert Secret.draw(None).seed != Secret.draw(None).seed
-
-
-def test_answers_are_what_was_committed_to(unsealed):
-    committed = json.loads((unsealed.folder / "commitments.json").read_text())
-    opened = json.loads((unsealed.folder / "answers.json").read_text())
-    assert opened["seed"] == SEED
-    assert [digest(text.encode()) for text in opened["answers"]] == list(committed.values())
-    assert len(unsealed.unseal()) == CASES
-
-
-def test_verdicts_carry_diagnosis_and_time(unsealed):
-    for values in unsealed.read_verdicts().values():
-        assert values["diagnosis"]["schema"] == "fjr_rig/diagnosis/2"
-        assert values["seconds"] > 0.0
-
-
-def test_the_report_shows_scores_and_figures(unsealed):
-    folder = unsealed.folder / "report"
-    text = (folder / "report.md").read_text()
-    assert f"{CASES} cases, seed {SEED}" in text
-    for name in ("accuracy", "calibration", "confusion"):
-        assert (folder / f"{name}.png").stat().st_size > 5000
-        assert f"({name}.png)" in text
-    scores = Scores.read(folder / "scores.json").methods["refit"].scores
-    assert scores["verdict_right"].cases == CASES
-
-
-def test_finished_verdicts_are_kept(unsealed):
-    files = [verdict_file(unsealed.folder, "refit", index) for index in range(CASES)]
-    before = [file.stat().st_mtime_ns for file in files]
-    again = BlindCheck.begin(unsealed.folder, CASES, SEED, ["refit"])
-    again.make_cases()
-    again.diagnose()
-    assert [file.stat().st_mtime_ns for file in files] == before
-
-
-def test_another_order_is_refused(unsealed):
-    with pytest.raises(InputError, match="holds a check of 2 cases"):
-        BlindCheck.begin(unsealed.folder, 3, SEED, ["refit"])
-
-
-def test_a_changed_verdict_is_found(unsealed):
-    file = verdict_file(unsealed.folder, "refit", 0)
-    before = file.read_bytes()
-    try:
-        file.write_bytes(before.replace(b'"case_000"', b'"case_000" '))
-        with pytest.raises(InputError, match="some were changed"):
-            unsealed.unseal()
-    finally:
-        file.write_bytes(before)
-
-
-def test_no_verdict_is_made_after_unsealing(unsealed):
-    file = verdict_file(unsealed.folder, "refit", 1)
-    hidden = file.rename(file.with_suffix(".away"))
-    try:
-        with pytest.raises(InputError, match="answers are unsealed"):
-            unsealed.diagnose()
-    finally:
-        hidden.rename(file)
-
-
-def test_a_changed_seal_is_found(unsealed, tmp_path):
-    file = sealed_file(unsealed.folder, 0)
-    data = bytearray(file.read_bytes())
-    data[60] ^= 1
-    with pytest.raises(InputError, match="case_000"):
-        decrypt(bytes(data), Secret.load(unsealed.check).key, str(file))
-
-
-def test_answers_stay_sealed_without_all_verdicts(state, tmp_path):
-    check = BlindCheck.begin(tmp_path / "blind", 1, 3, ["refit"])
-    with pytest.raises(InputError, match="finish the check"):
+def test_only_cases_without_a_verdict_are_left_to_do(state, tmp_path):
+    check = begun(tmp_path)
+    fill(check, ["closed_0001"])
+    assert [case.name for case in check.missing()] == ["closed_0000"]
+    with pytest.raises(InputError, match="lacks the verdicts on 1 of 2 cases"):
         check.unseal()
     assert not check.unsealed
 
 
-def test_another_seed_is_refused(state, tmp_path):
-    BlindCheck.begin(tmp_path / "blind", 1, 3, ["refit"])
+def test_a_finished_check_is_scored_from_its_raw_file_and_again(state, tmp_path):
+    check = begun(tmp_path)
+    fill(check, ["closed_0000", "closed_0001"])
+    report = score_check(check)
+    text = report.read_text()
+    assert f"2 cases, seed {SEED}" in text and frozen_digest()[:16] in text
+    for name in ("named", "present"):
+        assert (report.parent / f"{name}.png").stat().st_size > 3000 and f"({name}.png)" in text
+    scores = Scores.read(report.parent / "scores.json")
+    assert scores.methods["refit"]["closed"]["nothing_named"].value == 1.0
+    report.unlink()
+    assert score_check(BlindCheck.open(check.folder)).read_text() == text
+
+
+def test_an_unfinished_check_can_be_ended_and_says_so(state, tmp_path):
+    check = begun(tmp_path)
+    fill(check, ["closed_0000"])
+    text = score_check(check, unfinished=True).read_text()
+    assert "ended after 1 of 2 cases" in text
+    with pytest.raises(InputError, match="answers are unsealed"):
+        check.run()
+
+
+def test_a_changed_verdict_is_found(state, tmp_path):
+    check = begun(tmp_path)
+    fill(check, ["closed_0000", "closed_0001"])
+    check.unseal()
+    file = check.folder / "verdicts.jsonl"
+    file.write_bytes(file.read_bytes().replace(b"0.9", b"0.8"))
+    with pytest.raises(InputError, match="some verdicts were changed"):
+        check.unseal()
+
+
+def test_another_order_and_changed_sources_are_refused(state, tmp_path, monkeypatch):
+    check = begun(tmp_path)
+    with pytest.raises(InputError, match="other cases or methods"):
+        begun(tmp_path, {"closed": 3})
     with pytest.raises(InputError, match="another seed"):
-        BlindCheck.begin(tmp_path / "blind", 1, 4, ["refit"])
+        BlindCheck.begin(check.folder, CASES, SEED + 1, ["refit"])
+    monkeypatch.setattr(blind_check, "frozen_digest", lambda: "0" * 64)
+    with pytest.raises(InputError, match="has changed since this check began"):
+        begun(tmp_path)
+
+
+def test_what_is_frozen_exists():
+    folder = Path(blind_check.__file__).parent
+    assert all((folder / f"{name}.py").is_file() for name in FROZEN)
 
 
 def test_a_method_that_fails_says_so(tmp_path):
-    (tmp_path / "case_007").mkdir()
-    said = verdict("refit", tmp_path / "case_007")
-    assert said["error"].startswith("InputError")
-    assert "diagnosis" not in said
-
-
-ONE_FAINT = 1  # seed of a check whose only case lies below its detection limit
-
-
-def test_a_check_of_one_case_below_its_detection_limit_is_scored(state, tmp_path):
-    out = tmp_path / "blind"
-    options = ["--cases", "1", "--seed", str(ONE_FAINT), "--method", "refit", "--workers", "1"]
-    result = CliRunner().invoke(app, ["blind", "run", "--out", str(out), *options])
-    assert result.exit_code == 0, result.output
-    answers = BlindCheck.open(out).unseal()
-    assert [e.relative < 1.0 for answer in answers for e in answer.effects] == [True]
-    report = out / "report"
-    assert "1 case, seed 1" in (report / "report.md").read_text()
-    for name in ("accuracy", "calibration", "confusion"):
-        assert (report / f"{name}.png").exists() and (report / f"{name}.pdf").exists()
-    assert not list(report.glob(".*"))
-
-
-def test_what_would_stop_the_report_is_said_before_any_case_is_made(state, tmp_path):
-    out = tmp_path / "blind"
-    BlindCheck.begin(out, 1, SEED, ["refit"])
-    (out / "report").write_text("in the way")
-    options = ["--cases", "1", "--seed", str(SEED), "--method", "refit"]
-    result = CliRunner().invoke(app, ["blind", "run", "--out", str(out), *options])
-    assert result.exit_code == 2 and "where the report will go" in result.output
-    assert sorted(path.name for path in out.iterdir()) == ["blind.json", "report"]
+    (tmp_path / "bags").mkdir()
+    for method in METHODS:
+        said = verdict("open_0007", tmp_path / "bags", method)
+        assert said["error"].startswith("InputError") and said["case"] == "open_0007"
+        assert "diagnosis" not in said
 
 
 def test_a_key_that_is_lost_is_said_before_any_diagnosis(state, tmp_path):
-    out = tmp_path / "blind"
-    check = BlindCheck.begin(out, 1, None, ["refit"])
-    (state / "fjr_rig" / "blind" / f"{check.check}.json").unlink()
-    result = CliRunner().invoke(
-        app, ["blind", "run", "--out", str(out), "--cases", "1", "--method", "refit"]
-    )
+    check = begun(tmp_path)
+    (state / "fjr_rig" / "blind" / f"{check.manifest.check}.json").unlink()
+    result = CliRunner().invoke(app, order(check.folder, cases=2))
     assert result.exit_code == 2 and "the key of this blind check" in result.output
-    assert [path.name for path in out.iterdir()] == ["blind.json"]
 
 
-def test_a_seal_that_was_changed_is_found_before_any_diagnosis(unsealed, tmp_path):
-    out = tmp_path / "blind"
-    for name in ("blind.json", "commitments.json"):
-        out.mkdir(exist_ok=True)
-        (out / name).write_bytes((unsealed.folder / name).read_bytes())
-    for index in range(CASES):
-        other = sealed_file(unsealed.folder, 1 - index)
-        sealed_file(out, index).parent.mkdir(exist_ok=True)
-        sealed_file(out, index).write_bytes(other.read_bytes())
-    with pytest.raises(InputError, match="case_000 is not what was committed to"):
-        BlindCheck.open(out).check_seals()
+def test_what_would_stop_the_report_is_said_before_any_case_is_made(state, tmp_path):
+    check = begun(tmp_path)
+    (check.folder / "report").write_text("in the way")
+    result = CliRunner().invoke(app, order(check.folder, cases=2))
+    assert result.exit_code == 2 and "where the report will go" in result.output
+    assert not (check.folder / "sealed.jsonl").exists()
 
 
 @pytest.mark.parametrize(
@@ -245,4 +201,33 @@ def test_bad_input_is_one_sentence(state, tmp_path, arguments, words):
     assert result.exit_code == 2
     assert words in result.output
     assert "Traceback" not in result.output
-    assert not Path(places["folder"]).exists()
+
+
+def order(out: Path, cases: int) -> list[str]:
+    return ["blind", "run", "--out", str(out), "--cases", str(cases), "--world", "closed",
+            "--seed", str(SEED), "--method", "refit"]  # fmt: skip
+
+
+@pytest.mark.slow
+def test_a_run_that_is_killed_goes_on_where_it_was(state, tmp_path):
+    out = tmp_path / "blind"
+    command = [sys.executable, "-m", "fjr_cli", *order(out, cases=3), "--workers", "1"]
+    verdicts = out / "verdicts.jsonl"
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as process:
+        while not verdicts.exists() and process.poll() is None:
+            time.sleep(0.1)
+        process.send_signal(signal.SIGINT)
+        process.communicate()
+    before = verdicts.read_bytes()
+    assert before.count(b"\n") in (1, 2)
+    with verdicts.open("ab") as file:
+        file.write(b'{"case": "closed_00')
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert Path(done.stdout.strip().splitlines()[-1]) == out / "report" / "report.md"
+    after = verdicts.read_bytes()
+    assert after.startswith(before) and after.count(b"\n") == 3
+    seen = {json.loads(line)["case"] for line in after.splitlines()}
+    assert seen == {"closed_0000", "closed_0001", "closed_0002"}
+    assert not list((out / "cases").iterdir())
+    answers = JsonLines(out / "answers.jsonl").read()
+    assert {line["case"] for line in answers} == seen

@@ -7,7 +7,6 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from fjr_validation.blind.calibrate import calibrated, left_out, summary
 from gap_diagnosis.outcome.diagnosis import Candidate, Diagnosis, EvidenceKind, Gap, Gaps
 from gap_diagnosis.outcome.verdict_words import ON, meaning
 from gap_diagnosis.which.confidence import (
@@ -82,22 +81,3 @@ def test_what_contains_the_named_effect_or_is_in_its_set_is_no_rival():
     assert features(diagnosis)[1] == lead
     diagnosis.ranking.append(candidate(["hysteresis"], 1.5))
     assert features(diagnosis)[1] == pytest.approx(np.log(1.5))
-
-
-def test_the_regression_finds_the_shares_that_cases_were_drawn_with():
-    rng = np.random.default_rng(4)
-    cases = []
-    for second, right in ((2.0, 0.6), (20.0, 0.95)):
-        cases += [(said("effect", 1.0, second, ("backlash",)), rng.random() < right)
-                  for _ in range(400)]  # fmt: skip
-    beta = calibrated(cases)["named"]
-    for second, right in ((2.0, 0.6), (20.0, 0.95)):
-        values = features(said("effect", 1.0, second, ("backlash",)))
-        score = float(np.dot(beta, values))
-        assert 1.0 / (1.0 + np.exp(-score)) == pytest.approx(right, abs=0.06)
-
-
-def test_few_cases_without_a_miss_do_not_make_certain():
-    cases = [(said("effect", 1.0, 50.0, ("backlash",)), True)] * 8
-    assert 0.85 < left_out(cases)[0][0] < 0.999
-    assert any("8 of 8 right" in line for line in summary(cases))

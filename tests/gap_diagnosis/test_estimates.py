@@ -8,12 +8,8 @@ import numpy as np
 import pytest
 from gap_cases import SHORT, fitter_of, simulate_case
 
-from fjr_validation.blind.calibrate import widening
-from fjr_validation.blind.cases import NOMINAL, Answer, Effect
-from fjr_validation.blind.outcome import Outcome
 from gap_diagnosis.model.simulated_rig import Model
-from gap_diagnosis.outcome.diagnosis import Diagnosis, Estimate, Gaps
-from gap_diagnosis.which.estimates import WIDENING, estimates, standard_errors, sure
+from gap_diagnosis.which.estimates import estimates, standard_errors, sure
 from gap_diagnosis.which.fits import Fit
 from gap_diagnosis.which.least_squares import Solution
 from gap_diagnosis.which.search_space import Space
@@ -110,38 +106,6 @@ def test_a_gain_is_known_as_far_as_the_datasheet_is():
         found = estimates(fit, GROUP)[names[0]]
         assert 0.05 < found.high - found.low < 0.2
         assert sure(fit, GROUP) is there
-
-
-def said(count: int, *offs: float) -> Outcome:
-    """Return a right verdict of so many effects, its first parameters off by so much.
-
-    The interval is 1 to both sides before it is widened.
-    """
-    names = ("delay", "backlash")[:count]
-    true = [Effect(name, 1.0, 1.0, 1.0, {}) for name in names]
-    parameters = {
-        name: Estimate(value=NOMINAL[name] - off, low=NOMINAL[name] - off - WIDENING[count],
-                       high=NOMINAL[name] - off + WIDENING[count])
-        for name, off in zip(NOMINAL, offs, strict=False)
-    }  # fmt: skip
-    kind = ("parameters", "single", "two")[count]
-    diagnosis = Diagnosis(
-        verdict="effect" if count else "parameters_only", effects=list(names), confidence=0.9,
-        equivalent=[[name] for name in names], parameters=parameters,
-        gap=Gaps(nominal=None, refit=None, explained=None, noise_floor=None),
-    )  # fmt: skip
-    return Outcome("case_000", "fjr", Answer(kind, true, NOMINAL, 0.0), diagnosis, "", 1.0)
-
-
-def test_blind_cases_tell_by_how_much_intervals_must_be_widened():
-    rng = np.random.default_rng(5)
-    sizes = (0.3, 0.8, 2.0)
-    cases = [said(n, *size * rng.standard_normal(8)) for n, size in enumerate(sizes)
-             for _ in range(100)]  # fmt: skip
-    none, one, two = widening(cases)
-    assert none == 1.0  # never narrower than the theory says
-    assert one == pytest.approx(0.8 * 1.96, rel=0.1) and two == pytest.approx(2.0 * 1.96, rel=0.1)
-    assert widening([]) == pytest.approx(WIDENING)
 
 
 def test_intervals_tell_of_a_valley_along_which_parameters_replace_each_other():

@@ -1,0 +1,98 @@
+"""Folders of records: what `analyze` says of them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rig_records as rigs
+
+from bla_analyzer import analyze, load_result, write_result
+from bla_analyzer.results.findings import findings
+from bla_analyzer.results.summary import campaign, headline
+from fjr_interface.bags.writer import BagWriter
+from fjr_interface.experiment import RecordDescription
+from fjr_interface.topics import MOTOR_POSITION, MOTOR_TORQUE, REFERENCE
+from fjr_kit.errors import InputError
+
+SIGNALS = {"r": REFERENCE, "u": MOTOR_TORQUE, "y": MOTOR_POSITION}
+SECONDS = 20.0
+
+
+def write(folder: Path, data: np.ndarray, symbols: str = "ruy", **described) -> Path:
+    description = RecordDescription.of("test", sample_rate_hz=rigs.RATE, **described)
+    values = {s: row for s, row in zip("ruy", data, strict=True) if s in symbols}
+    with BagWriter(folder, description, signals=tuple(SIGNALS[s] for s in values)) as bag:
+        bag.write_arrays(**values)
+    return folder
+
+
+def data(seed: int = 1, kind: str = "noise", **options) -> np.ndarray:
+    rig = rigs.random_rig(3, linear=options.pop("linear", True))
+    options = {"noise": 0.01, "seed": seed} | options
+    return rigs.record(rig, kind, SECONDS, **options)
+
+
+def test_one_record_gives_an_estimate_with_uncertainty(tmp_path):
+    write(tmp_path / "rig" / "one", data())
+    result = analyze(tmp_path / "rig")
+    bla = result.levels[0].bla
+    assert (result.excitation, bla.method) == ("arbitrary", "local")
+    held = np.abs(bla.g - rigs.truth(rigs.random_rig(3, linear=True), bla.frequency_hz))
+    assert np.mean((held <= bla.radius_95)[bla.reliable]) > 0.85
+    assert campaign(result).startswith("Excitation without period: 1 level, 1 record, of up to 20")
+    said = " ".join(findings(result.levels[0]))
+    assert "Distortion and noise cannot be told apart" in said
+    assert "Odd and even distortion cannot be told apart" in said
+    assert any("are left out" in note for note in result.notes)
+    write_result(result, tmp_path / "out", figures=False, report=False)
+    again = load_result(tmp_path / "out" / "result.json")
+    np.testing.assert_array_equal(again.levels[0].bla.g, bla.g)
+    np.testing.assert_array_equal(again.levels[0].left_out_hz, result.levels[0].left_out_hz)
+
+
+def test_repeats_are_pooled_and_split_noise_from_distortion(tmp_path):
+    for number in range(3):
+        again = {"repeat_of": 0} if number else {}
+        record = data(noise_seed=number, linear=False, noise=2e-3)
+        write(tmp_path / f"run_{number}", record, realization=number, realizations=3, **again)
+    result = analyze(tmp_path)
+    bla = result.levels[0].bla
+    assert (result.excitation, bla.realizations, bla.periods) == ("repeated", 1, 3)
+    assert np.median(bla.var_noise / bla.var_total) < 0.2
+    assert "Total distortion with its noise" in " ".join(findings(result.levels[0]))
+
+
+def test_without_reference_the_bias_is_warned_of(tmp_path):
+    write(tmp_path / "rig" / "one", data(), symbols="uy")
+    result = analyze(tmp_path / "rig")
+    assert any("biased" in note and "-1/C" in note for note in result.notes)
+    bla = result.levels[0].bla
+    exact = rigs.truth(rigs.random_rig(3, linear=True), bla.frequency_hz)
+    inside = bla.frequency_hz < 5.0
+    assert np.median(np.abs(bla.g / exact - 1.0)[inside]) < 0.1
+
+
+def test_a_sweep_is_said_not_to_stand_for_noise(tmp_path):
+    write(tmp_path / "rig" / "one", data(kind="chirp"))
+    assert any("not Gaussian (kurtosis 1.5" in note for note in analyze(tmp_path / "rig").notes)
+
+
+def test_a_reference_of_another_run_does_not_pass(tmp_path):
+    """White noise with an artificial reference: no BLA, or a check that fails and says so."""
+    r, u, y = data()
+    other = np.random.default_rng(5).standard_normal(r.size)
+    write(tmp_path / "rig" / "one", np.stack([other, u, y]))
+    try:
+        result = analyze(tmp_path / "rig")
+    except InputError as error:
+        assert "follow the reference beyond noise" in str(error)
+    else:
+        assert "checks failed" in headline(result)
+
+
+def test_records_and_the_methods_of_multisines_do_not_meet(tmp_path):
+    write(tmp_path / "rig" / "one", data())
+    with pytest.raises(InputError, match="robust and fast method are for multisines"):
+        analyze(tmp_path / "rig", method="robust")
