@@ -125,7 +125,7 @@ def test_diagnose_says_causes_remainder_and_evidence_of_records_whole(console):
     text = " ".join(printed(console).split())
     assert text.startswith("Missing: gravity or torque bias; a remainder stays")
     for said in (
-        "97%", "61% (55 to 66%)", "8.058", "7.914 to 8.202", "142", "48.1", "19.3",
+        "97%", "61% (55 to 66%)", "8.06", "7.91 to 8.20", "142", "48.1", "19.3",
         "19% of the motion remains, 16% of the refit's squared gap.",
         "velocity (a law of friction): 42%",
         "level 1, 3.1 to 16 Hz (4.4 \N{GREEK SMALL LETTER SIGMA})",
