@@ -190,8 +190,8 @@ def test_what_a_refit_takes_over_does_not_show(drawn):
         more = {**drawn.plant, name: 1.02 * drawn.plant[name]}
         change = seen.change(more, {})
         assert seen.share(seen.left(change)) < 0.2 * seen.share(change)  # friction bends
-    delayed = seen.change(drawn.plant, {"delay_s": 1e-3})
-    twice = seen.change(drawn.plant, {"delay_s": 2e-3})
+    delayed = seen.change(drawn.plant, {"delay_s": 5e-5})
+    twice = seen.change(drawn.plant, {"delay_s": 1e-4})
     assert seen.relative(twice) == pytest.approx(2.0 * seen.relative(delayed), rel=0.2)
     assert FLOORS * seen.relative(delayed) * 1e-3 <= 2.0 * math.sqrt(len(firsts)) * seen.share(
         seen.left(delayed)
