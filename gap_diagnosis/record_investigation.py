@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from fjr_kit.errors import InputError
 from fjr_records.records import Record, RecordSet
 from fjr_sim_node import effects as fx
 
@@ -22,6 +23,8 @@ from .which.stepwise import Found, Stepwise, gain, stands_for
 
 Progress = Callable[[str], None]
 
+LEAST_SAMPLES = 64
+"""Of each record: eight of the shortest windows."""
 LONGEST_S = 300.0
 """Of all records together, what is played at the most (s)."""
 
@@ -91,7 +94,13 @@ def investigate_records(
 
 
 def _within(records: RecordSet) -> tuple[RecordSet, list[str]]:
-    """Cut records that are too long together; say so."""
+    """Refuse a record that is too short, and cut those that are too long together; say so."""
+    for record in records.records:
+        if record.samples < LEAST_SAMPLES:
+            raise InputError(
+                f"{record.name}: holds {record.samples} samples, too few to cut into windows; "
+                f"record {LEAST_SAMPLES} or more."
+            )
     total = sum(r.samples for r in records.records) / records.sample_rate_hz
     if total <= LONGEST_S:
         return records, []

@@ -65,10 +65,12 @@ def remainder_sentences(diagnosis: Diagnosis) -> list[str]:
 
 def place_words(place: Place) -> str:
     """Return a place as shown to a person, such as 'level 1, 3.1 to 16 Hz (4.4 sigma)'."""
-    low, high = map(hertz, place.band_hz)
+    low, high = map(two_digits, place.band_hz)
     band = f"0 to {high} Hz" if place.lines == "slow" else f"{low} to {high} Hz"
     kind = "" if place.lines in ("all", "slow") else f", {place.lines} lines"
-    sigma = f" ({place.sigma:.2g} \N{GREEK SMALL LETTER SIGMA})" if known(place.sigma) else ""
+    sigma = (
+        f" ({two_digits(place.sigma)} \N{GREEK SMALL LETTER SIGMA})" if known(place.sigma) else ""
+    )
     return f"level {place.level}, {band}{kind}{sigma}"
 
 
@@ -97,9 +99,9 @@ def percent(ratio: float | None) -> str:
     return f"{value:.{max(1 - math.floor(math.log10(size)), 1)}f}%"
 
 
-def hertz(frequency: float) -> str:
-    """Return a frequency with two digits below a hundred, in whole hertz above."""
-    return f"{frequency:.2g}" if frequency < 99.5 else f"{frequency:.0f}"
+def two_digits(value: float) -> str:
+    """Return a frequency or a ratio with two digits below a hundred, whole above."""
+    return f"{value:.2g}" if value < 99.5 else f"{value:.0f}"
 
 
 def digits(estimate: Estimate) -> tuple[str, str, str]:

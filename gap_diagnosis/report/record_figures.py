@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from fjr_kit.figure_style import EXCITED, NOISE, ODD, SIGMA, WIDTH_IN, legend
 
 from ..how_far.record_comparison import RecordComparison
-from ..outcome.cause_words import hertz
+from ..outcome.cause_words import two_digits
 from ..outcome.verdict_words import explanation
 from .gap_figures import LEVEL_COLORS
 
@@ -52,7 +52,7 @@ def draw_bands(found: Sequence[RecordComparison], *, known: bool) -> Figure:
             axis.axhline(1.0, color=NOISE, lw=0.8, ls="--", label="noise")
         axis.set_yscale("log")
         ends = level.edges_hz
-        axis.set_xticks(range(ends.size - 1), [f"to {hertz(end)}" for end in ends[1:]])
+        axis.set_xticks(range(ends.size - 1), [f"to {two_digits(end)}" for end in ends[1:]])
         axis.set_ylabel(f"level {level.level}: error / {SIGMA if known else 'motion'}")
     axes[-1].set_xlabel("band (Hz)", labelpad=1)
     legend(axes[0], *axes[1:])

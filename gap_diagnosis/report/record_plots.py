@@ -13,7 +13,7 @@ import numpy as np
 from fjr_kit.plots import PLAIN, SECONDS, Options, Plot, extremes, layout, numbers, stack, trace
 
 from ..how_far.record_comparison import RecordComparison
-from ..outcome.cause_words import hertz, known
+from ..outcome.cause_words import known, two_digits
 from ..outcome.diagnosis import Candidate
 from ..outcome.verdict_words import explanation
 from .gap_level_plots import MODEL_STYLES
@@ -54,8 +54,8 @@ def _time(found: RecordComparison) -> Plot:
 def _bands(found: RecordComparison, noise_known: bool) -> Plot:
     """Return the rms error in each band after each step."""
     edges = found.edges_hz
-    names = ["0 to " + hertz(edges[1])]
-    names += [f"{hertz(a)} to {hertz(b)}" for a, b in pairwise(edges[1:])]
+    names = ["0 to " + two_digits(edges[1])]
+    names += [f"{two_digits(a)} to {two_digits(b)}" for a, b in pairwise(edges[1:])]
     at = np.arange(len(names), dtype=float)
     unit = _SIGMA if noise_known else "of the motion"
     traces = []
