@@ -16,10 +16,10 @@ from fjr_records.realization import FALSE_ALARM, period_mismatch, unsettled
 from fjr_records.recorded import RecordedExperiment, RecordedRealization
 from fjr_records.spectra import PeriodSums
 
+from ..model.controller_check import check_controller
 from ..model.discretisation import discretisation_error
 from ..model.simulated_rig import Model
 from ..outcome.diagnosis import Bags
-from .controller_check import check_controller
 from .data_notes import data_notes
 from .stationarity import PERIOD_Z_LIMIT, period_drift
 

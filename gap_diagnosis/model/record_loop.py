@@ -17,7 +17,7 @@ from controller_node.law import as_transfer_function, law_of
 from controller_node.transfer_function import TransferFunction
 from fjr_records.records import Record, RecordSet
 
-from ..gates.controller_gains import identify_gains
+from .controller_gains import identify_gains
 
 Loop = Literal["known", "gains_fitted", "unknown"]
 

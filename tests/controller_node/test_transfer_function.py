@@ -16,7 +16,7 @@ from fjr_kit.errors import InputError
 from fjr_records.recorded import RecordedExperiment
 from fjr_sim_node import effects, plant
 from fjr_sim_node.simulation import closed_loop
-from gap_diagnosis.gates.controller_check import check_controller
+from gap_diagnosis.model.controller_check import check_controller
 from gap_diagnosis.model.discretisation import discretisation_error
 from gap_diagnosis.model.simulated_rig import Model, Simulator
 

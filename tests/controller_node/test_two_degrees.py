@@ -19,7 +19,7 @@ from fjr_kit.errors import InputError
 from fjr_sim_node import plant
 from fjr_sim_node.simulation import closed_loop, rig
 from fjr_sim_node.theory.delayed_loop import spectral_radius
-from gap_diagnosis.gates.controller_check import check_law
+from gap_diagnosis.model.controller_check import check_law
 
 RATE = 1000.0
 PLANT = plant.coefficients(plant.PLANT.defaults())

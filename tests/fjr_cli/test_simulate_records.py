@@ -7,7 +7,7 @@ import pytest
 
 from controller_node.law import law_of
 from fjr_records.records import read_records
-from gap_diagnosis.gates.controller_check import check_law
+from gap_diagnosis.model.controller_check import check_law
 
 SHORT = ["--realizations", "2", "--workers", "1"]
 CASCADE = (

@@ -16,8 +16,8 @@ from fjr_kit.errors import InputError
 from fjr_records.records import read_records
 from fjr_sim_node import plant
 from fjr_sim_node.simulation import closed_loop
-from gap_diagnosis.gates.controller_check import check_law
-from gap_diagnosis.gates.controller_gains import identify_gains
+from gap_diagnosis.model.controller_check import check_law
+from gap_diagnosis.model.controller_gains import identify_gains
 
 RATE = 1000.0
 SERVO_RUNS = ("10h28m10", "10h28m42", "10h29m14", "10h29m47")

@@ -13,10 +13,10 @@ from fjr_records.recorded import RecordedExperiment, read_experiment
 from fjr_sim_node.plant import PLANT
 from gap_diagnosis.gates.bag_changes import bag_changes
 from gap_diagnosis.gates.bags_gate import bags_gate
-from gap_diagnosis.gates.controller_check import check_controller
 from gap_diagnosis.gates.gate_checks import check_gates
 from gap_diagnosis.gates.stationarity import PERIOD_Z_LIMIT, period_drift
 from gap_diagnosis.model import discretisation
+from gap_diagnosis.model.controller_check import check_controller
 from gap_diagnosis.model.discretisation import discretisation_error
 from gap_diagnosis.model.simulated_rig import Model, Simulator
 

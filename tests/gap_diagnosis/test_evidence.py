@@ -1,0 +1,149 @@
+"""Evidence of records, fits beside a remainder, and the tests of presence, on simulated records."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from controller_node import pd_filtered
+from fjr_interface.experiment import RecordDescription
+from fjr_records.records import Record, RecordSet
+from fjr_sim_node import effects as fx
+from fjr_sim_node.plant import PLANT, coefficients
+from fjr_sim_node.simulation.closed_loop import simulate
+from gap_diagnosis.model.evidence import Evidence
+from gap_diagnosis.model.simulated_rig import Model
+from gap_diagnosis.which.cell_fits import CellFitter
+from gap_diagnosis.which.presence import at_its_bound, beyond_zero, cell_estimates, invariance
+from gap_diagnosis.which.stepwise import Gain, gain
+
+RATE, NOISE = 500.0, 2e-5
+LAW = pd_filtered.CONTROLLER.check({"sample_rate_hz": RATE})
+NOMINAL = {name: float(value) for name, value in PLANT.defaults().items()}
+BIAS = {"torque_bias.torque_nm": 1.5}
+
+
+def reference(seed: int, samples: int, rms_rad: float) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    lines = np.fft.rfftfreq(samples, 1.0 / RATE)
+    spectrum = np.where((lines > 0.3) & (lines < 15.0), 1.0, 0.0) * np.exp(
+        2j * np.pi * rng.uniform(size=lines.size)
+    )
+    signal = np.fft.irfft(spectrum, samples)
+    return rms_rad * signal / signal.std() * np.minimum(1.0, np.arange(samples) / 100.0)
+
+
+def records(effects=None, *, runs=1, seconds=8.0, known=True, scatter=0.0) -> RecordSet:
+    """Return runs of the paper's rig at two levels; friction may scatter from run to run."""
+    made, samples = [], int(seconds * RATE)
+    rng = np.random.default_rng(5)
+    for level, rms in enumerate((0.02, 0.06)):
+        for run in range(runs):
+            factor = float(np.exp(scatter * rng.standard_normal()))
+            plant = {**NOMINAL, "fs": factor * NOMINAL["fs"], "fsm": factor * NOMINAL["fsm"]}
+            signals = simulate(
+                reference(10 * level + run, samples, rms),
+                RATE,
+                coefficients(plant),
+                pd_filtered.coefficients(LAW),
+                NOISE * rng.standard_normal(samples),
+                fx.coefficients(effects or {}),
+            )
+            description = RecordDescription.of(
+                "test", sample_rate_hz=RATE, level=level, levels=2, realization=run,
+                realizations=runs, controller=pd_filtered.describe(LAW) if known else None,
+            )  # fmt: skip
+            made.append(
+                Record(
+                    f"level_{level}_run_{run}",
+                    description,
+                    signals.reference if known else None,
+                    signals.torque,
+                    signals.position,
+                    None,
+                )
+            )
+    return RecordSet("test", RATE, tuple(made))
+
+
+@cache
+def biased() -> tuple[CellFitter, object, object]:
+    """Return a fitter, its refit and the fit with a torque bias, of records that have one."""
+    fitter = CellFitter(Evidence(records(BIAS, scatter=0.02)), NOMINAL, 0.1)
+    refit = fitter.refit()
+    proposals = fitter.screening(refit, "torque_bias").proposals()
+    return fitter, refit, fitter.add(refit, "torque_bias", proposals)
+
+
+@pytest.mark.parametrize(("runs", "whole"), [(1, False), (2, False), (3, True), (4, True)])
+def test_every_part_has_one_purpose_and_no_window_two(runs, whole):
+    evidence = Evidence(records(runs=runs, seconds=5.0))
+    purposes = {name: evidence.parts_for(name) for name in ("fit", "select", "report")}
+    assert sorted(sum(purposes.values(), ())) == list(range(len(evidence.parts)))
+    assert all(purposes.values())
+    windows = [
+        (p.record, w) for p in evidence.parts for w in range(p.windows.start, p.windows.stop)
+    ]
+    assert len(windows) == len(set(windows))
+    of = {name: {evidence.parts[i].record for i in parts} for name, parts in purposes.items()}
+    assert whole == (not of["fit"] & of["select"] and not of["fit"] & of["report"]
+                     and not of["select"] & of["report"])  # fmt: skip
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_the_true_model_leaves_noise_alone(known):
+    evidence = Evidence(records(BIAS, known=known))
+    assert evidence.simulator.loop.kind == ("known" if known else "unknown")
+    parts = tuple(range(len(evidence.parts)))
+    errors = evidence.errors([Model(NOMINAL, BIAS), Model(NOMINAL, {})], parts)
+    left = np.sqrt(np.mean(errors**2, axis=1)) / NOISE
+    assert 0.8 < left[0] < 1.6  # the loop amplifies encoder noise
+    assert left[1] > 3.0 * left[0]
+
+
+def test_a_motion_that_diverges_is_a_bad_value_and_no_error():
+    evidence = Evidence(records(seconds=5.0))
+    unstable = Model({**NOMINAL, "jm": 1e-5, "j": 1e-5, "k0": 1e8}, {})
+    assert np.isfinite(evidence.errors([unstable], evidence.parts_for("fit"))).all()
+
+
+def test_a_cause_is_fitted_beside_friction_that_scatters():
+    fitter, refit, fit = biased()
+    found = gain(fitter, fit, refit)
+    assert found.present and found.share == 1.0
+    bias = cell_estimates(fit, fitter.groups)["torque_bias.torque_nm"]
+    assert bias.low < 1.5 < bias.high and bias.high - bias.low < 0.3
+    assert beyond_zero("torque_bias", cell_estimates(fit, fitter.groups))
+    assert not at_its_bound(fit, "torque_bias")
+
+
+def test_a_true_cause_is_the_same_at_all_levels_and_a_substitute_is_not():
+    fitter, _, fit = biased()
+    assert invariance(fitter, fit, "torque_bias") > 0.01
+    # A size that is wrong at one level: the residuals of that level are those of another bias.
+    level = np.array([fitter.evidence.parts[p].level for p in fitter.groups])
+    column = len(fit.space.nominal)
+    shift = np.where(level == 1, 0.5 * fit.solution.x[column], 0.0)
+    moved = fit.solution.residuals + shift * fit.solution.jacobian[:, column]
+    wrong = replace(fit, solution=replace(fit.solution, residuals=moved))
+    assert invariance(fitter, wrong, "torque_bias") < 1e-3
+
+
+def test_a_gain_by_one_part_or_one_that_does_not_repeat_is_no_presence():
+    assert Gain(mean=10.0, without_best=8.0, share=1.0, p=0.002).present
+    assert not Gain(mean=10.0, without_best=0.1, share=1.0, p=0.002).present
+    assert not Gain(mean=10.0, without_best=8.0, share=0.6, p=0.002).present
+    assert not Gain(mean=10.0, without_best=8.0, share=1.0, p=0.2).present
+    assert not Gain(mean=0.5, without_best=0.4, share=1.0, p=0.002).present
+
+
+def test_nothing_is_gained_by_an_effect_that_is_not_there():
+    fitter = CellFitter(Evidence(records(scatter=0.02)), NOMINAL, 0.1)
+    refit = fitter.refit()
+    for effect in ("torque_bias", "gravity", "quadratic_friction"):
+        proposals = fitter.screening(refit, effect).proposals()
+        fit = fitter.add(refit, effect, proposals) if proposals else None
+        assert fit is None or not gain(fitter, fit, refit).present, effect
