@@ -147,7 +147,11 @@ def test_another_publisher_in_the_domain_is_refused_by_name(domain, tmp_path, pe
     from fjr_interface.ros import runtime
 
     peer.node.create_publisher(JointState, "reference", runtime.SIGNAL_QOS)
-    sentence = r"Several nodes publish on /rig/reference \((/rig/peer|/rig/excitation, /rig/peer)"
+    who_saw_it = (
+        r"(Several nodes publish on|has publishers of different nodes)"  # graph or controller
+    )
+    topic, nodes = "/rig/reference", r"\((/rig/peer|/rig/excitation(,| and) /rig/peer)"
+    sentence = rf"({who_saw_it} {topic}|{topic} {who_saw_it}) {nodes}"
     with pytest.raises(InputError, match=sentence):
         in_graph(campaign(), tmp_path / "campaign")
     assert contents(tmp_path / "campaign") == {}
