@@ -80,6 +80,7 @@ class Effect:
         ripple: whether it is periodic in the motor angle, so that `cycles_per_turn` is searched.
         scales: whether it scales the parameters of the bare plant, wholly or about one angle.
         contains: effects that it holds as limit cases, which explain what they can with less.
+        on_request: whether a diagnosis looks for it only if it is asked to.
         of_bare_plant: whether it is the bare plant with other values, so that its kernel is the
             bare one.
         axis: which axes can have it; empty: flexible ones if it acts on transmission or link, else
@@ -99,6 +100,7 @@ class Effect:
     ripple: bool = False
     scales: bool = False
     contains: tuple[str, ...] = ()
+    on_request: bool = False
     of_bare_plant: bool = False
     axis: Literal["", "both", "rigid"] = ""
 

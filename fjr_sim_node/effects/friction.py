@@ -139,6 +139,7 @@ FRICTION: tuple[Effect, ...] = (
              "velocity_rad_s": (0.0025, 0.0125, 0.06), "damping_nm_s_rad": (0.005,)},
         ),
         contains=("stribeck_friction_motor", "presliding_friction"),
+        on_request=True,
     ),
     Effect(
         "load_friction",

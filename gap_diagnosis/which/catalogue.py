@@ -14,6 +14,7 @@ def catalogue(nominal: Mapping[str, float], asked: Sequence[str] | None = None) 
     """Return the effects that a rig can have, or those of them that were asked for.
 
     A rigid axis has none of transmission and link, and friction is added only where there is none.
+    What is looked for on request only has to be asked for.
 
     Args:
         nominal: datasheet values of the base parameters.
@@ -27,7 +28,11 @@ def catalogue(nominal: Mapping[str, float], asked: Sequence[str] | None = None) 
             raise InputError(
                 f"effects: {name} is no effect; the effects are {', '.join(fx.EFFECTS)}."
             )
-    found = [e for e in possible_effects(nominal) if asked is None or e in asked]
+    found = [
+        name
+        for name in possible_effects(nominal)
+        if (name in asked if asked is not None else not fx.EFFECTS[name].on_request)
+    ]
     if asked is not None and not found:
         raise InputError(
             f"effects: none of {', '.join(asked) or 'the named effects'} can be fitted to this "
