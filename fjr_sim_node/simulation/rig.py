@@ -20,6 +20,7 @@ LINK, MOTOR = 0, 2
 _TIME, _SLEWED, _HEAD, _RING = 10, 11, 12, 13
 _RING_SIZE = 16_384  # samples of the longest delay: 100 ms at 20 kHz, each in eight parts
 _SLEW_PARTS = 8
+_AT_ONCE = 1e-3  # of a sample: a torque that slews no longer is held as a whole
 
 
 def at_rest(elapsed_s: float = 0.0) -> np.ndarray:
@@ -104,7 +105,8 @@ def hold(x, command, sample_period, p, e):
     if e is None:
         x[0], x[1], x[2], x[3] = advance(x[0], x[1], x[2], x[3], command, sample_period, p)
         return
-    parts = 1 if e[fx.TORQUE_SLEW_LIMIT_LIMIT_NM_S] == math.inf else _SLEW_PARTS
+    most = e[fx.TORQUE_SLEW_LIMIT_LIMIT_NM_S] * sample_period
+    parts = 1 if abs(command - x[_SLEWED]) <= _AT_ONCE * most else _SLEW_PARTS
     for _ in range(parts):
         _hold_with_effects(x, command, sample_period / parts, p, e)
 

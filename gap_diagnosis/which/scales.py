@@ -6,6 +6,7 @@ its unit and from the part that its effect acts on.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -101,11 +102,12 @@ class Scales:
                 "N m/rad": self.torque_nm / self.angle_rad,
             }[parameter.unit]
         inner = fx.EFFECTS[name.split(".", 1)[0]].acts_on == "transmission"
+        drag = re.fullmatch(r"N m s(\d*)/rad\1", parameter.unit)
+        if drag:
+            return self.torque_nm / self.velocity_rad_s ** int(drag[1] or 1)
         return {
             "": 1.0,
             "N m": self.torque_nm,
-            "N m s/rad": self.torque_nm / self.velocity_rad_s,
-            "N m s2/rad2": self.torque_nm / self.velocity_rad_s**2,
             "rad": self.deflection_rad if inner else self.angle_rad,
             "rad/N m": self.angle_rad / self.torque_nm,
             "rad/s": self.velocity_rad_s,

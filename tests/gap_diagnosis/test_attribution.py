@@ -31,14 +31,6 @@ def test_an_explanation_that_leaves_a_lot_must_stand_out(left, refit, rival, out
     assert (stands_out(left, refit, rival) > STANDS_OUT) is out
 
 
-class FewEffects(Fitter):
-    """A fitter whose catalogue holds a third mass and a gain of the torque."""
-
-    @property
-    def catalogue(self) -> list[str]:
-        return ["extra_mode", "torque_gain"]
-
-
 def test_a_gain_is_no_second_cause_beside_a_mode_on_a_rig_beyond_the_tolerance():
     mode = {
         "extra_mode.inertia_kg_m2": 0.1,
@@ -49,7 +41,8 @@ def test_a_gain_is_no_second_cause_beside_a_mode_on_a_rig_beyond_the_tolerance()
     recorded = simulate_case(mode, seed=3, plant=plant, **SHORT).recorded
     noise = noise_levels(recorded).of_outputs(recorded)
     nominal = Model.nominal(PLANT.defaults()).plant
-    fitter = FewEffects(recorded, Simulator(recorded), noise, nominal, (0, 2), (1, 3), 0.03)
+    few = ("extra_mode", "torque_gain")
+    fitter = Fitter(recorded, Simulator(recorded), noise, nominal, (0, 2), (1, 3), 0.03, few)
     found = Search(fitter).run()
     assert found.best.effects == ("extra_mode",) and found.explained
     assert not any({"extra_mode", "torque_gain"} == set(f.effects) for f in found.candidates)

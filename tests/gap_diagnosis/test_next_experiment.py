@@ -25,13 +25,12 @@ GRAVITY = {"gravity.torque_nm": 1.0, "gravity.angle_rad": math.pi / 2}
 def search(recorded, *names):
     """Search over a few effects, else as a diagnosis does."""
 
-    class Few(Fitter):
-        catalogue = names
-
     simulator = Simulator(recorded)
     noise = simulator.noise(Model.nominal(NOMINAL)).of_outputs(recorded)
     numbers = range(len(recorded.realizations))
-    fitter = Few(recorded, simulator, noise, NOMINAL, numbers[0::2], numbers[1::2])
+    fitter = Fitter(
+        recorded, simulator, noise, NOMINAL, numbers[0::2], numbers[1::2], effects=names
+    )
     return Search(fitter).run(), noise
 
 

@@ -41,13 +41,11 @@ ANY_SCALES = Scales(100.0, 5.0, 0.05, 0.05, 1e-3, 50.0, 0.5, 300.0)
 def search(recorded, nominal, *names):
     """Search over a few effects, else as a diagnosis does."""
 
-    class Few(Fitter):
-        catalogue = names or Fitter.catalogue
-
     model, simulator = Model.nominal(nominal), Simulator(recorded)
     noise = simulator.noise(model).of_outputs(recorded)
     numbers = range(len(recorded.realizations))
-    fitter = Few(recorded, simulator, noise, model.plant, numbers[0::2], numbers[1::2])
+    train, held = numbers[0::2], numbers[1::2]
+    fitter = Fitter(recorded, simulator, noise, model.plant, train, held, effects=names or None)
     return Search(fitter).run(), fitter
 
 
