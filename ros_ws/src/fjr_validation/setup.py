@@ -10,5 +10,5 @@ setup(
         ("share/fjr_validation", ["package.xml"]),
     ],
     install_requires=["setuptools"],
-    extras_require={"test": ["pytest"]},
+    extras_require={"test": ["pytest"], "dask": ["distributed>=2024.8"]},
 )
