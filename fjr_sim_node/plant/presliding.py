@@ -59,7 +59,10 @@ def has_motor_bristles(e):
 
 @inlined
 def bristle_damping(built, level, direction, speed, e):
-    """Return the damping of the motor's bristles (N m): sigma1 dz/dt, never against the slip.
+    """Return the damping of the motor's bristles (N m): sigma1(v) dz/dt, never against the slip.
+
+    sigma1 fades with the Stribeck velocity, as passivity asks, and dz/dt is that of bristles which
+    hold no more than the Coulomb level (Olsson 1996, thesis, Lund, ch. 5).
 
     Args:
         built: torque of the bristles (N m).
@@ -70,7 +73,10 @@ def bristle_damping(built, level, direction, speed, e):
     """
     if e[fx.LUGRE_FRICTION_DAMPING_NM_S_RAD] == 0.0 or direction * built >= level:
         return 0.0
-    return e[fx.LUGRE_FRICTION_DAMPING_NM_S_RAD] * (1.0 - direction * built / level) * speed
+    ratio = speed / e[fx.LUGRE_FRICTION_VELOCITY_RAD_S]
+    damping = e[fx.LUGRE_FRICTION_DAMPING_NM_S_RAD] * math.exp(-ratio * ratio)
+    held = direction * built / level if direction * built > -level else -1.0
+    return damping * (1.0 - held) * speed
 
 
 @inlined

@@ -133,7 +133,8 @@ def _fastest_rate(stiffness, twist, decay, s, torque, p, e):
     )
     decay += e[fx.LUGRE_FRICTION_STRIBECK_NM] / (e[fx.LUGRE_FRICTION_VELOCITY_RAD_S] * p[JM])
     if e[fx.LUGRE_FRICTION_BRISTLE_NM_RAD] != math.inf:
-        decay += e[fx.LUGRE_FRICTION_DAMPING_NM_S_RAD] / p[JM]
+        # sigma1 exp(-u^2) (1 - F / L) v: |1 - F / L| <= 2, and L falls as fast as sigma1 does
+        decay += 3.0 * e[fx.LUGRE_FRICTION_DAMPING_NM_S_RAD] / p[JM]
     decay += _decay_at_limit(s, torque, e) / p[JM]
     decay += 2.0 * e[fx.QUADRATIC_FRICTION_LINK_NM_S2_RAD2] * abs(s[1]) / p[J]
     decay += (

@@ -26,6 +26,7 @@ from .torques import link_level, motor_has_coulomb, motor_level
 from .transmission import (
     deflection,
     deflection_speed,
+    has_kinks,
     lever_slope,
     next_region,
     region_margin,
@@ -141,7 +142,7 @@ def _margin(which, s, torque, m, w, p, e):
         if e[fx.HYSTERESIS_TORQUE_NM] == 0.0:
             return 1.0
         return deflection_speed(s[1], s[2], s[3], e) * m[2]
-    if e[fx.BACKLASH_HALF_GAP_RAD] == 0.0 and e[fx.PIECEWISE_STIFFNESS_ZONE_RAD] == 0.0:
+    if not has_kinks(e):
         return 1.0
     return region_margin(deflection(s[0], s[2], e), m[3], e)
 

@@ -77,29 +77,42 @@ def spring_torque(d, p, e):
 
 
 @inlined
+def has_kinks(e):
+    """Tell whether the spring's slope jumps anywhere."""
+    return (
+        e[fx.BACKLASH_HALF_GAP_RAD] != 0.0
+        or e[fx.PIECEWISE_STIFFNESS_ZONE_RAD] != 0.0
+        or e[fx.ASYMMETRIC_STIFFNESS_RELATIVE] != 0.0
+    )
+
+
+@inlined
 def _kinks(e):
-    """Return the deflections at which the spring's slope jumps, inner and outer (rad)."""
-    if e[fx.BACKLASH_HALF_GAP_RAD] == 0.0:
-        return e[fx.PIECEWISE_STIFFNESS_ZONE_RAD], math.inf
-    if e[fx.PIECEWISE_STIFFNESS_ZONE_RAD] == 0.0:
-        return e[fx.BACKLASH_HALF_GAP_RAD], math.inf
-    return e[fx.BACKLASH_HALF_GAP_RAD], e[fx.BACKLASH_HALF_GAP_RAD] + e[
-        fx.PIECEWISE_STIFFNESS_ZONE_RAD
-    ]
+    """Return the deflections at which the spring's slope jumps, inner and outer (rad).
+
+    Two stiffnesses meet at zero, unless a gap lies there, in which neither acts.
+    """
+    gap, zone = e[fx.BACKLASH_HALF_GAP_RAD], e[fx.PIECEWISE_STIFFNESS_ZONE_RAD]
+    if gap == 0.0 and e[fx.ASYMMETRIC_STIFFNESS_RELATIVE] == 0.0:
+        return zone, math.inf
+    if zone == 0.0:
+        return gap, math.inf
+    return gap, gap + zone
 
 
 @inlined
 def spring_region(d, speed, e):
     """Return in which smooth part of the spring a deflection is: 0 inside, +-1, +-2 outside.
 
-    On a kink the speed decides.
+    On a kink the speed decides. Where the inner kinks are one, at zero, nothing is inside.
     """
     inner, outer = _kinks(e)
-    side = 1.0 if d > 0.0 else -1.0
+    positive = d > 0.0 or (d == 0.0 and speed >= 0.0)
+    side = 1.0 if positive else -1.0
     outward = side * speed > 0.0
     if abs(d) > outer or (abs(d) == outer and outward):
         return 2.0 * side
-    if abs(d) > inner or (abs(d) == inner and outward):
+    if abs(d) > inner or (abs(d) == inner and outward) or inner == 0.0:
         return side
     return 0.0
 
@@ -119,7 +132,7 @@ def region_margin(d, region, e):
 def region_slope(d, speed, region, e):
     """Return the time derivative of `region_margin` (rad/s)."""
     inner, outer = _kinks(e)
-    side = 1.0 if d > 0.0 else -1.0
+    side = 1.0 if region > 0.0 or (region == 0.0 and d > 0.0) else -1.0
     if region == 0.0 or (abs(region) == 1.0 and d * region - inner >= outer - d * region):
         return -side * speed
     return side * speed
@@ -133,7 +146,9 @@ def next_region(d, region, e):
         return 1.0 if d > 0.0 else -1.0
     if abs(region) == 2.0:
         return 0.5 * region
-    return 0.0 if d * region - inner < outer - d * region else 2.0 * region
+    if d * region - inner >= outer - d * region:
+        return 2.0 * region
+    return 0.0 if inner > 0.0 else -region
 
 
 @inlined

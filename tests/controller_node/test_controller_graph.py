@@ -75,7 +75,8 @@ class Joint:
 
 def test_an_unreadable_reference_trips(start, peer):
     joint = Joint(start, peer)
-    assert joint.play(3)[0] == pytest.approx(0.01 * GAIN)
+    # A position is answered at once: that of the first reference, or of one that came just before.
+    assert next(filter(None, joint.play(3))) == pytest.approx(0.01 * GAIN)
     joint.reference.publish(joint_state(4 * MS))
     assert "a message of reference is unreadable: position[0] is empty" in joint.tripped()
     joint.rests()

@@ -34,10 +34,13 @@ def lugre_motion(torque, step, sigma1):
 
     def slope(t, y):
         _, v, z = y
-        level = FSM + 2.0 * math.exp(-((v / 0.05) ** 2))
+        fade = math.exp(-((v / 0.05) ** 2))
+        level = FSM + 2.0 * fade
         dz = v - 6e3 * abs(v) / level * z
         bending = dz if dz * v > 0.0 else 0.0
-        return [v, (torque(t) - 6e3 * z - sigma1 * bending) / JM, dz]
+        if abs(bending) > 2.0 * abs(v):  # bristles that hold more than a level which has fallen
+            bending = 2.0 * v
+        return [v, (torque(t) - 6e3 * z - sigma1 * fade * bending) / JM, dz]
 
     times = np.arange(1, 401) * step
     run = solve_ivp(slope, (0.0, times[-1]), [0.0, 0.0, 0.0], t_eval=times, rtol=1e-9, atol=1e-12,
