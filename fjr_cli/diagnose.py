@@ -70,7 +70,7 @@ def diagnose(
     from fjr_kit.folder_lock import locked_folder
     from fjr_kit.invocation import call_date, command_line
     from fjr_records.experiment_bag import Override
-    from fjr_records.recorded import RecordedExperiment
+    from fjr_records.periodic import RecordedExperiment
     from gap_diagnosis.any_record import investigate_any, read_any
     from gap_diagnosis.model.nominal import read_nominal, refuse_wrong_units
     from gap_diagnosis.report.gap_output import write_diagnosis

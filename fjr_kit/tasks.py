@@ -13,6 +13,7 @@ import hashlib
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import as_completed
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -125,10 +126,15 @@ def computed(
             yield futures[future], future.result()
 
 
-def _on_cluster(tasks: Sequence[Task], scheduler: str) -> Iterator[tuple[Task, Any]]:
+@contextmanager
+def dask_client(scheduler: str) -> Iterator[Any]:
+    """Lend a `distributed.Client` of a scheduler's address.
+
+    Raises:
+        InputError: Dask is not installed, or no scheduler answers.
+    """
     with needing("Dask", "install fjr-rig[dask], or leave --dask out"):
         from distributed import Client
-        from distributed import as_completed as completed
     try:
         client = Client(scheduler, timeout=_CONNECT_S, set_as_default=False)
     except (OSError, ValueError) as error:
@@ -137,6 +143,13 @@ def _on_cluster(tasks: Sequence[Task], scheduler: str) -> Iterator[tuple[Task, A
             "or leave --dask out."
         ) from None
     with client:
+        yield client
+
+
+def _on_cluster(tasks: Sequence[Task], scheduler: str) -> Iterator[tuple[Task, Any]]:
+    with dask_client(scheduler) as client:
+        from distributed import as_completed as completed
+
         futures = {
             client.submit(task.function, **task.parameters, key=task.name, pure=False): task
             for task in tasks

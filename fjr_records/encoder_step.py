@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .recorded import RecordedExperiment
+from .periodic import RecordedExperiment
 
 _LEAST = 1e-9  # rad; finer steps are the storage's
 _OFF_GRID = 1e-3  # of a step

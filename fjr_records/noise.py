@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .recorded import RecordedExperiment, RecordedRealization
+from .periodic import RecordedExperiment, RecordedRealization
 
 HALF_WIDTH = 3
 """Number of neighbours on each side over which noise power is averaged, fewer at the lowest lines:

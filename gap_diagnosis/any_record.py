@@ -12,7 +12,7 @@ from fjr_interface.experiment import RecordDescription
 from fjr_interface.resampling.accuracy import Resampling
 from fjr_kit.errors import InputError
 from fjr_records.experiment_folder import Override
-from fjr_records.recorded import RecordedExperiment, read_experiment
+from fjr_records.periodic import RecordedExperiment, read_experiment
 from fjr_records.records import RecordSet, read_records, reference_optional
 
 from .investigation import Investigation, investigate

@@ -12,7 +12,7 @@ import numpy as np
 
 from fjr_records.encoder_step import position_step
 from fjr_records.noise import NoiseLevels, even_lines_as_noise
-from fjr_records.recorded import RecordedExperiment
+from fjr_records.periodic import RecordedExperiment
 
 from .gates.bags_gate import with_bags_gate
 from .gates.gate_checks import GateReport, check_gates

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from fjr_records.recorded import RecordedExperiment
+from fjr_records.periodic import RecordedExperiment
 
 from .gates.gate_checks import GateReport
 from .how_far.held_out_gap import held_out_gap

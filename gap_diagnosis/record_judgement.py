@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .how_far.record_ledger import Ledger
 from .model.evidence import Evidence
 from .model.simulated_rig import Model
 from .outcome.diagnosis import (
@@ -15,17 +16,12 @@ from .outcome.diagnosis import (
     Cause,
     Diagnosis,
     EvidenceKind,
-    Figure,
     Gap,
     Gaps,
-    Place,
-    Remainder,
     ReportedOn,
-    Stage,
     Step,
     Verdict,
 )
-from .where.remainder import looks_like
 from .which.cell_fits import CellFit, CellFitter
 from .which.presence import (
     LEAST_INVARIANCE_P,
@@ -43,8 +39,6 @@ PLAIN = 4.0
 """The same for the refit where no effect gains anything."""
 FEWEST_PARTS = 6
 """Parts that select, below which the evidence is too thin for any name."""
-_DRAWS = 1000
-_MOST_PLACES = 4
 
 THIN = (
     "The records are too short or too few to hold anything out of the fits, so nothing is named: "
@@ -103,120 +97,6 @@ def tested_causes(fitter: CellFitter, fit: CellFit, groups: np.ndarray) -> list[
             )
         )
     return found
-
-
-class Ledger:
-    """Figures of models on the parts that report."""
-
-    def __init__(self, evidence: Evidence) -> None:
-        """Take the evidence; the parts that select stand in where none reports."""
-        self.evidence = evidence
-        self.parts = evidence.reporting
-        self.runs = sorted({evidence.parts[p].record for p in self.parts})
-        self._part = evidence.part_of(self.parts)
-        energy = {
-            i: max(float(np.mean((r.position - r.position.mean()) ** 2)), 1e-300)
-            for i, r in enumerate(evidence.records.records)
-        }
-        of_part = np.array([energy[part.record] for part in evidence.parts])
-        self._scale = of_part[self._part] * evidence.hop
-        self._floor = evidence.floor(self.parts)[evidence.cell_of(self.parts)]
-
-    def squares(self, model: Model) -> np.ndarray:
-        """Return the squared error over the squared motion of each reporting part, (parts,)."""
-        errors = self.evidence.errors([model], self.parts)[0]
-        place = {part: k for k, part in enumerate(self.parts)}
-        part = np.array([place[p] for p in self._part])
-        windows = np.array([self.evidence.windows(p) for p in self.parts])
-        return np.bincount(part, errors**2 / self._scale) / windows
-
-    def step(self, model: Model, added: str | None, stage: Stage) -> Step:
-        """Return the gap of a model."""
-        evidence = self.evidence
-        errors = evidence.errors([model], self.parts)[0]
-        runs = evidence.simulator.run([model], self.runs)[0]
-        torque = [
-            float(np.mean((run[1] - r.torque) ** 2) / max(float(np.var(r.torque)), 1e-300))
-            for run, r in zip(runs, (evidence.records.records[i] for i in self.runs), strict=True)
-        ]
-        chi2 = float(np.mean(errors**2 / self._floor)) if evidence.noise.known else math.nan
-        return Step(
-            added=added,
-            stage=stage,
-            nrmse_position=float(np.sqrt(np.mean(self.squares(model)))),
-            nrmse_torque=float(np.sqrt(np.mean(torque))),
-            chi2_per_dof=chi2,
-        )
-
-    def noise(self) -> Gap | None:
-        """Return the gap that noise alone leaves; None where it is not known."""
-        evidence = self.evidence
-        if not evidence.noise.known:
-            return None
-        each = evidence.noise.std_rad**2 / self._scale
-        windows = sum(evidence.windows(p) for p in self.parts)
-        return Gap(
-            nrmse_position=float(np.sqrt(np.sum(each) / windows)),
-            nrmse_torque=None,
-            chi2_per_dof=1.0,
-        )
-
-    def places(self, sigma: np.ndarray) -> list[Place]:
-        """Return the strongest cells of (cells,) deviations as places."""
-        evidence = self.evidence
-        known = evidence.noise.known
-        order = np.argsort(-sigma)[:_MOST_PLACES]
-        found = []
-        for cell in order.tolist():
-            if not sigma[cell] > 1.0:
-                continue
-            level, band = divmod(cell, evidence.bands)
-            low, high = evidence.edges[band], evidence.edges[band + 1]
-            found.append(
-                Place(
-                    level=evidence.records.levels[level],
-                    band_hz=(float(low * evidence.line_hz), float(high * evidence.line_hz)),
-                    lines="slow" if band == 0 else "all",
-                    signal="position",
-                    sigma=float(sigma[cell]) if known else math.nan,
-                )
-            )
-        return found
-
-    def places_of_error(self, model: Model) -> list[Place]:
-        """Return where a model errs."""
-        errors = self.evidence.errors([model], self.parts)[0]
-        squares = self.evidence.mean_squares(errors, self.parts)
-        return self.places(np.sqrt(squares / self.evidence.floor(self.parts)))
-
-    def share(self, without: Model, best: Model, refit: Model) -> Figure:
-        """Return how much of what the refit left comes back without a cause, with its interval."""
-        lost = self.squares(without) - self.squares(best)
-        gap = self.squares(refit)
-        draws = np.random.default_rng(0).integers(0, gap.size, (_DRAWS, gap.size))
-        shares = lost[draws].sum(1) / np.maximum(gap[draws].sum(1), 1e-300)
-        low, high = np.quantile(shares, (0.025, 0.975))
-        one = gap.size < 2
-        return Figure(
-            value=float(lost.sum() / max(gap.sum(), 1e-300)),
-            low=math.nan if one else float(low),
-            high=math.nan if one else float(high),
-        )
-
-    def remainder(self, best: Model, refit: Model) -> Remainder:
-        """Return what a model leaves, and what that looks like."""
-        left, gap = self.squares(best), self.squares(refit)
-        evidence = self.evidence
-        records = [evidence.records.records[i] for i in self.runs]
-        missing = evidence.simulator.missing_torque(best, self.runs)
-        smooth = max(int(evidence.records.sample_rate_hz / (evidence.lines * evidence.line_hz)), 1)
-        finite = all(np.isfinite(m).all() for m in missing)
-        return Remainder(
-            nrmse_position=float(np.sqrt(left.mean())),
-            share=float(left.sum() / max(gap.sum(), 1e-300)),
-            looks_like=looks_like(records, missing, smooth) if finite else [],
-            where=self.places_of_error(best),
-        )
 
 
 def judge_records(

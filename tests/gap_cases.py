@@ -13,7 +13,7 @@ from controller_node import pd_filtered
 from excitation_node import multisine
 from fjr_interface.bags.writer import BagWriter
 from fjr_records.noise import noise_levels
-from fjr_records.recorded import RecordedExperiment, RecordedRealization
+from fjr_records.periodic import RecordedExperiment, RecordedRealization
 from fjr_sim_node.plant import PLANT
 from fjr_sim_node.simulation.simulator import SIMULATOR, run_realization
 from gap_diagnosis.model.simulated_rig import Model, Simulator

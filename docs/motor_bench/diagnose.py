@@ -12,7 +12,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
-from fjr_records.recorded import RecordedExperiment, RecordedRealization, read_experiment
+from fjr_records.periodic import RecordedExperiment, RecordedRealization, read_experiment
 from fjr_records.spectra import line_spectrum
 from gap_diagnosis.model.misfit import Misfit
 from gap_diagnosis.model.simulated_rig import Model, Simulator

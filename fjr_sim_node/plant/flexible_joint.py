@@ -26,6 +26,7 @@ from fjr_kit.compiled import jit
 from .. import effects as fx
 from .places import FS, FSM, FV, FVM, JM, K0, K1, J
 from .presliding import with_bristles
+from .spring import deflection, deflection_speed, spring_region
 from .step_size import fastest_rate, pushes, reach, reach_within_energy
 from .stick_slip import (
     advance_smoothly,
@@ -35,7 +36,6 @@ from .stick_slip import (
     motor_direction,
     remembered,
 )
-from .transmission import deflection, deflection_speed, spring_region
 
 __all__ = ["FS", "FSM", "FV", "FVM", "JM", "K0", "K1", "PLANT", "J", "advance", "coefficients"]
 

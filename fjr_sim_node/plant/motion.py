@@ -19,6 +19,7 @@ from fjr_kit.compiled import inlined, jit
 from .. import effects as fx
 from .places import FS, FSM, JM, LINK_BRISTLES, MOTOR_BRISTLES, J
 from .presliding import bristle_damping, bristle_torque
+from .spring import build_up, deflection, transmitted_torque
 from .torques import (
     link_drive,
     link_level,
@@ -27,7 +28,6 @@ from .torques import (
     motor_level,
     motor_viscous,
 )
-from .transmission import build_up, deflection, transmitted_torque
 
 
 @inlined

@@ -11,8 +11,8 @@ from fjr_kit.compiled import inlined, jit
 
 from .. import effects as fx
 from .places import FS, FV, FVM, JM, K0, K1, LINK_BRISTLES, MOTOR_BRISTLES, J, is_rigid
+from .spring import deflection, deflection_speed
 from .torques import load_coefficient, motor_level_bound
-from .transmission import deflection, deflection_speed
 
 
 @inlined

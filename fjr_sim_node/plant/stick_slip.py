@@ -22,8 +22,7 @@ from .motion import (
     transmitted,
 )
 from .places import LINK_BRISTLES, MOTOR_BRISTLES
-from .torques import link_level, motor_has_coulomb, motor_level
-from .transmission import (
+from .spring import (
     deflection,
     deflection_speed,
     has_kinks,
@@ -32,6 +31,7 @@ from .transmission import (
     region_margin,
     region_slope,
 )
+from .torques import link_level, motor_has_coulomb, motor_level
 
 _MAX_EVENTS = 32
 _FROM_ZERO = 1e-9  # a margin that starts below this share of its fall starts from zero

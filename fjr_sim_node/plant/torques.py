@@ -12,7 +12,7 @@ from fjr_kit.compiled import inlined
 
 from .. import effects as fx
 from .places import FS, FSM, FV, FVM, is_rigid
-from .transmission import lever, ripple
+from .spring import lever, ripple
 
 
 @inlined

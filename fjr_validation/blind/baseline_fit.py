@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fjr_records.recorded import read_experiment
+from fjr_records.periodic import read_experiment
 from fjr_records.spectra import line_spectrum
 from gap_diagnosis.model.simulated_rig import Model, Simulator
 from gap_diagnosis.outcome.diagnosis import Gap

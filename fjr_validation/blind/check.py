@@ -227,10 +227,10 @@ class BlindCheck:
         sealed, kept = self._sealed, self._verdicts
         known = {(line["case"], line["method"]) for line in kept.read()}
         for job, lines in finished_jobs(self._jobs(missing), sealed.append, scheduler, workers):
+            if not keep_bags:  # first, for nobody looks again at the folder of a case with verdicts
+                shutil.rmtree(job.folder, ignore_errors=True)
             new = [line for line in lines if (line["case"], line["method"]) not in known]
             kept.append(*new)
-            if not keep_bags:
-                shutil.rmtree(job.folder, ignore_errors=True)
             done += 1
             said = ", ".join(line.get("error") or line["diagnosis"]["verdict"] for line in lines)
             report(done, total, f"{job.name}: {said}")

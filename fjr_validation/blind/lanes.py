@@ -10,10 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fjr_kit.errors import InputError, needing
+from fjr_kit.errors import InputError
+from fjr_kit.tasks import dask_client
 from fjr_kit.worker_pool import worker_count, worker_pool
-
-_CONNECT_S = "20s"
 
 Call = tuple[Callable[..., Any], Mapping[str, Any]]
 """An importable function with its keyword arguments."""
@@ -101,16 +100,7 @@ def _executors(
             looker = stack.enter_context(worker_pool(count, finish=False))
             yield maker, looker, count
         return
-    with needing("Dask", "install fjr-rig[dask], or leave --dask out"):
-        from distributed import Client
-    try:
-        client = Client(scheduler, timeout=_CONNECT_S, set_as_default=False)
-    except (OSError, ValueError) as error:
-        raise InputError(
-            f"No Dask scheduler answers at {scheduler} ({error}); start one with `dask scheduler`, "
-            "or leave --dask out."
-        ) from None
-    with client:
+    with dask_client(scheduler) as client:
         executor = client.get_executor(pure=False)
         count = workers or max(1, sum(client.nthreads().values()))
         yield executor, executor, count

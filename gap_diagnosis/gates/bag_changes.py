@@ -18,7 +18,7 @@ import numpy as np
 from scipy import optimize, stats
 
 from fjr_records.noise import NoiseLevels
-from fjr_records.recorded import RecordedExperiment
+from fjr_records.periodic import RecordedExperiment
 
 from ..model.simulated_rig import Model, Simulator
 from .bag_deviations import deviations

@@ -5,7 +5,7 @@ from __future__ import annotations
 from scipy.stats import norm
 
 from fjr_records.noise import NoiseLevels
-from fjr_records.recorded import RecordedExperiment
+from fjr_records.periodic import RecordedExperiment
 
 from ..model.simulated_rig import Model, Simulator
 from ..outcome.diagnosis import Bags, BagTrend, Estimate

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fjr_records.noise import ONE_PERIOD, NoiseLevels
-from fjr_records.recorded import RecordedExperiment
+from fjr_records.periodic import RecordedExperiment
 
 from ..model.prediction import loses
 

@@ -12,8 +12,8 @@ from fjr_kit.check import Check, failed
 from fjr_records.encoder_step import position_step
 from fjr_records.lines import classify
 from fjr_records.noise import NoiseLevels, noise_levels
+from fjr_records.periodic import RecordedExperiment, RecordedRealization
 from fjr_records.realization import FALSE_ALARM, period_mismatch, unsettled
-from fjr_records.recorded import RecordedExperiment, RecordedRealization
 from fjr_records.spectra import PeriodSums
 
 from ..model.controller_check import check_controller

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
-from fjr_records.recorded import RecordedExperiment
+from fjr_records.periodic import RecordedExperiment
 
 EVEN_LINES_PER_BLOCK = 12
 """The noise falls steeply over few lines only; within a block excited and even lines alternate."""

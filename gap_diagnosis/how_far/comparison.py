@@ -16,7 +16,7 @@ from bla_analyzer.bla.robust import robust_bla
 from bla_analyzer.distortion.levels import line_levels
 from bla_analyzer.results.result import LineLevels
 from fjr_records.lines import Lines, classify
-from fjr_records.recorded import RecordedExperiment
+from fjr_records.periodic import RecordedExperiment
 from fjr_records.spectra import PeriodSums, RealizationSpectra
 
 from ..model.simulated_rig import Signals

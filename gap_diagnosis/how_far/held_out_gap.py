@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fjr_records.lines import Lines, classify, interpolate_frf
-from fjr_records.recorded import RecordedExperiment
+from fjr_records.periodic import RecordedExperiment
 from fjr_records.spectra import line_spectrum
 
 from ..model.simulated_rig import Signals

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fjr_records.recorded import RecordedExperiment
+from fjr_records.periodic import RecordedExperiment
 
 from ..outcome.diagnosis import Cause, Diagnosis, EvidenceKind, Gap, Gaps, Stage, Step
 

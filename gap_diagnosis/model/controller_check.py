@@ -17,7 +17,7 @@ from scipy.signal import lfilter
 from controller_node.law import Law, as_transfer_function, law_of
 from controller_node.transfer_function import TransferFunction
 from fjr_kit.errors import InputError
-from fjr_records.recorded import RecordedRealization
+from fjr_records.periodic import RecordedRealization
 
 FORGOTTEN = 1e-9
 """What may be left of the unknown state with which the controller entered the record."""

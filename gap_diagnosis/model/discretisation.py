@@ -6,7 +6,7 @@ import numpy as np
 
 from controller_node.law import as_transfer_function, law_of
 from fjr_kit.errors import InputError
-from fjr_records.recorded import RecordedExperiment
+from fjr_records.periodic import RecordedExperiment
 from fjr_sim_node.simulation.closed_loop import simulate_law
 
 from .simulated_rig import Model

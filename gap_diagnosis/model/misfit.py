@@ -13,7 +13,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fjr_records.recorded import RecordedExperiment
+from fjr_records.periodic import RecordedExperiment
 from fjr_records.spectra import line_spectrum
 
 from .simulated_rig import Model, Simulator

@@ -15,7 +15,7 @@ import numpy as np
 
 from fjr_interface.parameter_file import load_parameter_file
 from fjr_kit.errors import InputError
-from fjr_records.recorded import RecordedExperiment
+from fjr_records.periodic import RecordedExperiment
 from fjr_records.spectra import line_spectrum
 from fjr_sim_node import effects as fx
 from fjr_sim_node.plant import PLANT

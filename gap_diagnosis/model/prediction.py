@@ -18,7 +18,7 @@ from dataclasses import replace
 import numpy as np
 
 from controller_node.transfer_function import TransferFunction
-from fjr_records.recorded import RecordedExperiment
+from fjr_records.periodic import RecordedExperiment
 from fjr_sim_node.simulation.closed_loop import Trajectory
 
 CROSSOVER_SHARE = 0.1

@@ -14,7 +14,7 @@ import numpy as np
 from controller_node.law import law_of
 from fjr_kit.errors import InputError
 from fjr_records.noise import NoiseLevels, noise_levels
-from fjr_records.recorded import RecordedExperiment, RecordedRealization
+from fjr_records.periodic import RecordedExperiment, RecordedRealization
 from fjr_sim_node import effects as fx
 from fjr_sim_node import plant
 from fjr_sim_node.simulation.closed_loop import Trajectory, simulate, simulate_law

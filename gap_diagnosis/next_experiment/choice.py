@@ -18,7 +18,7 @@ import numpy as np
 
 from controller_node.law import law_of
 from fjr_kit.errors import InputError
-from fjr_records.recorded import RecordedExperiment
+from fjr_records.periodic import RecordedExperiment
 from fjr_records.spectra import line_spectrum
 from fjr_sim_node.simulation.closed_loop import simulate
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from controller_node.pd_filtered import from_description
 from fjr_interface.experiment import Experiment
-from fjr_records.recorded import RecordedExperiment
+from fjr_records.periodic import RecordedExperiment
 from fjr_records.records import RecordSet
 from fjr_sim_node import effects, plant
 from fjr_sim_node.simulation.simulator import SIMULATOR

@@ -16,7 +16,7 @@ import numpy as np
 from scipy import stats
 
 from fjr_records.noise import NoiseLevels
-from fjr_records.recorded import RecordedExperiment
+from fjr_records.periodic import RecordedExperiment
 from fjr_records.spectra import line_spectrum
 
 from ..outcome.diagnosis import LineKind, Place

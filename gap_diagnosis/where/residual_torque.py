@@ -19,13 +19,13 @@ import numpy as np
 
 from fjr_kit.compiled import jit
 from fjr_records.noise import NoiseLevels
-from fjr_records.recorded import RecordedExperiment, RecordedRealization
+from fjr_records.periodic import RecordedExperiment, RecordedRealization
 from fjr_sim_node import effects as fx
 from fjr_sim_node.plant import advance, advance_with_effects
 from fjr_sim_node.plant.places import FS, FSM, FV, K0, K1, J
 from fjr_sim_node.plant.presliding import bristle_damping, has_motor_bristles
+from fjr_sim_node.plant.spring import transmitted_torque
 from fjr_sim_node.plant.torques import motor_drive, motor_level, motor_viscous
-from fjr_sim_node.plant.transmission import transmitted_torque
 from fjr_sim_node.simulation.rig import at_rest, driven
 
 from ..model.simulated_rig import Model

@@ -1,9 +1,9 @@
 """Confidence of a verdict: a logistic regression on the figures of the diagnosis.
 
 One regression for each kind of verdict, on a few figures of the ranking. The coefficients are not
-set by hand: `fjr_validation.blind.calibrate` fits them to blind cases whose answers are open, and
-prints this table. They were fitted to the 240 cases of the seeds 102 (48), 103 (72) and 105 (120),
-the last before what they showed was mended; so few were missed that the prior still counts.
+set by hand: they were fitted, with a weak prior, to 240 blind cases whose answers are open, those
+of the seeds 102 (48), 103 (72) and 105 (120) of the check that docs/blind.md reports; so few were
+missed that the prior still counts.
 """
 
 from __future__ import annotations

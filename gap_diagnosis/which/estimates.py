@@ -20,7 +20,7 @@ from .fits import Fit
 WIDENING: tuple[float, ...] = (1.0, 1.27, 1.92)
 """Factor on the standard errors of the bare parameters in a fit with no effect, one, and more.
 
-From `fjr_validation.blind.calibrate` on the seeds 102, 103 and 105: 456, 776 and 216 parameters.
+From the blind cases of `confidence`: 456, 776 and 216 parameters.
 """
 _NORMAL_95 = 1.96
 

@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from fjr_records.recorded import RecordedExperiment
+from fjr_records.periodic import RecordedExperiment
 from fjr_sim_node import effects as fx
 
 from ..model.misfit import Misfit

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from controller_node.law import as_transfer_function, law_of
-from fjr_records.recorded import RecordedExperiment
+from fjr_records.periodic import RecordedExperiment
 from fjr_records.spectra import line_spectrum
 from fjr_sim_node import effects as fx
 

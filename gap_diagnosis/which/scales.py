@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fjr_records.recorded import RecordedExperiment
+from fjr_records.periodic import RecordedExperiment
 from fjr_sim_node import effects as fx
 
 _QUARTER_CYCLE = 0.2  # rad of rms motion: about a quarter of what is then travelled to and fro

@@ -13,7 +13,7 @@ from controller_node import pd_filtered, transfer_function
 from controller_node.law import as_transfer_function, law_of
 from controller_node.transfer_function import TransferFunction
 from fjr_kit.errors import InputError
-from fjr_records.recorded import RecordedExperiment
+from fjr_records.periodic import RecordedExperiment
 from fjr_sim_node import effects, plant
 from fjr_sim_node.simulation import closed_loop
 from gap_diagnosis.model.controller_check import check_controller

@@ -10,7 +10,7 @@ from fjr_interface.bags.writer import BagWriter
 from fjr_interface.experiment import Experiment, RecordDescription, parse_experiment
 from fjr_interface.topics import MOTOR_POSITION, MOTOR_TORQUE, REFERENCE
 from fjr_kit.errors import InputError
-from fjr_records.recorded import read_experiment
+from fjr_records.periodic import read_experiment
 
 PUBLISHED = (
     '{"schema": "fjr_rig/experiment/1", "kind": "record", "sample_rate_hz": 1000.0, '

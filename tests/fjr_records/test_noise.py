@@ -9,7 +9,7 @@ import pytest
 from gap_cases import NOISE_RAD, simulate_case, write_bags
 
 from fjr_records.noise import noise_levels, scatter_of_mean, smoothed
-from fjr_records.recorded import RecordedExperiment, read_experiment
+from fjr_records.periodic import RecordedExperiment, read_experiment
 
 
 def test_smoothing_keeps_white_noise_unbiased_and_states_its_degrees_of_freedom():

@@ -18,7 +18,7 @@ from fjr_interface.experiment import Experiment
 from fjr_interface.resampling.accuracy import Resampling
 from fjr_kit.errors import InputError
 from fjr_records.experiment_bag import Override
-from fjr_records.recorded import read_experiment
+from fjr_records.periodic import read_experiment
 
 MAP = [
     "position=/joint_states:position[elbow]",

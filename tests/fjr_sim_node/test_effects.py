@@ -29,7 +29,7 @@ from scipy.special import ellipk
 from fjr_kit.document_tables import in_step
 from fjr_sim_node import effects, plant
 from fjr_sim_node.effects import document
-from fjr_sim_node.plant import torques, transmission
+from fjr_sim_node.plant import spring, torques
 from fjr_sim_node.simulation import rig
 
 JM, J, FSM, FS, FVM, FV, K0, K1 = (
@@ -267,9 +267,9 @@ def test_drag_alone_slows_the_link_exponentially_over_its_way():
     assert state[1] == pytest.approx(-2.0 * math.exp(3.0 * state[0] / J), rel=1e-5)
 
 
-def spring(d, **on):
+def torque_at(d, **on):
     e = effects.coefficients({**named("torque_bias", torque_nm=1.0), **on})
-    return np.array([transmission.spring_torque(float(x), plant.coefficients(PAPER), e) for x in d])
+    return np.array([spring.spring_torque(float(x), plant.coefficients(PAPER), e) for x in d])
 
 
 TWISTS = np.linspace(-0.01, 0.01, 401)
@@ -277,7 +277,7 @@ TWISTS = np.linspace(-0.01, 0.01, 401)
 
 def test_backlash_transmits_nothing_in_the_gap_and_the_spring_beyond():
     beyond = np.sign(TWISTS) * np.maximum(np.abs(TWISTS) - 2e-3, 0.0)
-    torque = spring(TWISTS, **named("backlash", half_gap_rad=2e-3))
+    torque = torque_at(TWISTS, **named("backlash", half_gap_rad=2e-3))
     assert np.allclose(torque, K0 * beyond + K1 * beyond**3, rtol=1e-14, atol=1e-14)
     assert (torque[np.abs(TWISTS) < 2e-3] == 0.0).all()
 
@@ -293,23 +293,23 @@ def test_backlash_lets_the_motor_move_alone_within_the_gap():
 def test_piecewise_stiffness_has_its_slopes_and_no_jump():
     on = named("piecewise_stiffness", zone_rad=2e-3, soft_ratio=0.3)
     seen = np.sign(TWISTS) * (np.abs(TWISTS) - 0.7 * np.minimum(np.abs(TWISTS), 2e-3))
-    torque = spring(TWISTS, **on)
+    torque = torque_at(TWISTS, **on)
     assert np.allclose(torque, K0 * seen + K1 * seen**3, rtol=1e-13, atol=1e-14)
     slopes = np.diff(torque - K1 * seen**3) / np.diff(TWISTS)
     middle = 0.5 * (TWISTS[1:] + TWISTS[:-1])
     assert np.allclose(slopes, np.where(np.abs(middle) < 2e-3, 0.3 * K0, K0), rtol=1e-9)
-    assert np.array_equal(spring(-TWISTS, **on), -spring(TWISTS, **on))
+    assert np.array_equal(torque_at(-TWISTS, **on), -torque_at(TWISTS, **on))
 
 
 def test_piecewise_stiffness_of_ratio_one_is_the_bare_spring_and_of_zero_is_backlash():
     full = named("piecewise_stiffness", zone_rad=2e-3, soft_ratio=1.0)
-    assert np.allclose(spring(TWISTS, **full), K0 * TWISTS + K1 * TWISTS**3, rtol=1e-14, atol=0.0)
+    assert np.allclose(torque_at(TWISTS, **full), K0 * TWISTS + K1 * TWISTS**3, rtol=1e-14, atol=0.0)
     r = multisine_reference(7e-3)[:2000]
     zone = effects.coefficients(named("piecewise_stiffness", zone_rad=2e-3, soft_ratio=0.0))
     gap = effects.coefficients(named("backlash", half_gap_rad=2e-3))
     assert np.allclose(
-        spring(TWISTS, **named("piecewise_stiffness", zone_rad=2e-3, soft_ratio=0.0)),
-        spring(TWISTS, **named("backlash", half_gap_rad=2e-3)), rtol=1e-14, atol=0.0,
+        torque_at(TWISTS, **named("piecewise_stiffness", zone_rad=2e-3, soft_ratio=0.0)),
+        torque_at(TWISTS, **named("backlash", half_gap_rad=2e-3)), rtol=1e-14, atol=0.0,
     )  # fmt: skip
     for k1 in (0.0, K1, 1e7):
         positions = [simulate(r, e, k1=k1).position for e in (zone, gap)]
@@ -371,7 +371,7 @@ def test_kinematic_error_follows_virtual_work():
 
     step = 1e-6
     for q, th in [(0.0, 0.0), (0.01, 0.05), (-0.02, 0.3)]:
-        te = transmission.transmitted_torque(q, 0.0, th, 0.0, 0.0, p, e)
+        te = spring.transmitted_torque(q, 0.0, th, 0.0, 0.0, p, e)
         on_link = torques.link_drive(q, 0.0, te, 0.0, 0.0, p, e)
         on_motor = torques.motor_drive(th, 0.0, te, 0.0, p, e)
         assert on_link == pytest.approx((energy(q - step, th) - energy(q + step, th)) / 2 / step,

@@ -20,7 +20,7 @@ from effect_rig import (
 from scipy.integrate import quad, solve_ivp
 
 from fjr_sim_node import effects, plant
-from fjr_sim_node.plant import torques, transmission
+from fjr_sim_node.plant import spring, torques
 
 JM, J, FSM, K0, K1 = (PAPER[name] for name in ("jm", "j", "fsm", "k0", "k1"))
 FREE_MOTOR = {**APART, **FRICTIONLESS}
@@ -156,7 +156,7 @@ def test_an_asymmetric_stiffness_has_its_two_slopes():
     e = effects.coefficients(named("asymmetric_stiffness", relative=0.3))
     p = plant.coefficients(PAPER)
     for twist, slope in ((0.01, 1.3), (-0.01, 0.7)):
-        torque = transmission.spring_torque(twist, p, e)
+        torque = spring.spring_torque(twist, p, e)
         assert torque == pytest.approx(slope * K0 * twist + K1 * twist**3, rel=1e-14)
 
 

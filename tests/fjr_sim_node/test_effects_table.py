@@ -29,7 +29,7 @@ def test_the_law_of_an_effect_is_where_its_entry_says(effect: fx.Effect) -> None
 def test_every_parameter_is_read_by_a_kernel() -> None:
     kernels = [
         "plant.torques",
-        "plant.transmission",
+        "plant.spring",
         "plant.presliding",
         "plant.motion",
         "plant.stick_slip",
@@ -117,7 +117,7 @@ from fjr_sim_node.simulation.simulator import SIMULATOR, run_realization
 from fjr_interface.parameter_file import load_parameter_file
 from fjr_bringup.campaign.plan import Campaign
 from fjr_records.noise import noise_levels
-from fjr_records.recorded import RecordedExperiment, RecordedRealization
+from fjr_records.periodic import RecordedExperiment, RecordedRealization
 from gap_diagnosis.model.simulated_rig import Model, Simulator
 from gap_diagnosis.outcome.verdict_words import explanation, unit_of
 from gap_diagnosis.which.fits import Fitter

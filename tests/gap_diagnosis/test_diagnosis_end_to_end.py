@@ -11,7 +11,7 @@ from gap_cases import simulate_case, write_bags
 from typer.testing import CliRunner
 
 from fjr_cli.app import app
-from fjr_records.recorded import read_experiment
+from fjr_records.periodic import read_experiment
 from fjr_sim_node.plant import PLANT
 from gap_diagnosis.investigation import investigate
 from gap_diagnosis.outcome.diagnosis import Diagnosis

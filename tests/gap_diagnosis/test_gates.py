@@ -9,7 +9,7 @@ import pytest
 from gap_cases import simulate_case, with_other_noise, write_bags
 
 from fjr_records.noise import noise_levels
-from fjr_records.recorded import RecordedExperiment, read_experiment
+from fjr_records.periodic import RecordedExperiment, read_experiment
 from fjr_sim_node.plant import PLANT
 from gap_diagnosis.gates.bag_changes import bag_changes
 from gap_diagnosis.gates.bags_gate import bags_gate

@@ -10,7 +10,7 @@ import pytest
 from motor_bench import NEEDS_RECORDS, imported
 from paths import DOCS
 
-from fjr_records.recorded import RecordedExperiment, read_experiment
+from fjr_records.periodic import RecordedExperiment, read_experiment
 
 SCRIPT = DOCS / "motor_bench" / "diagnose.py"
 

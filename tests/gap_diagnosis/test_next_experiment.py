@@ -8,7 +8,7 @@ import pytest
 from gap_cases import simulate_case
 
 from controller_node import pd_filtered
-from fjr_records.recorded import RecordedExperiment, RecordedRealization
+from fjr_records.periodic import RecordedExperiment, RecordedRealization
 from fjr_sim_node import effects, plant
 from fjr_sim_node.plant import PLANT
 from fjr_sim_node.simulation.closed_loop import simulate

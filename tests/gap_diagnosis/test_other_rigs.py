@@ -9,7 +9,7 @@ from effect_rig import relative_rms
 from gap_cases import simulate_case, write_bags
 
 from fjr_interface.bags.reader import SignalMap
-from fjr_records.recorded import read_experiment
+from fjr_records.periodic import read_experiment
 from fjr_sim_node import effects, plant
 from fjr_sim_node.plant import PLANT
 from fjr_sim_node.simulation.simulator import SIMULATOR

@@ -1,4 +1,4 @@
-"""The transmission of the plant and its effects, compiled: deflection, spring, lever, losses.
+"""The spring between motor and link and its effects, compiled: deflection, torque, lever, losses.
 
 `p` and `e` are parameters as in `torques`.
 """
