@@ -81,7 +81,7 @@ def investigate_records(
     names = catalogue(model.plant, effects)
     records, cut = _within(records)
     progress("windows and noise")
-    evidence = Evidence(records)
+    evidence = Evidence(records, nominal)
     fitter = CellFitter(evidence, model.plant, tolerance)
     found = Stepwise(fitter, names, progress, begun + budget_s).run()
     found, tested = _kept(fitter, found, progress)

@@ -8,7 +8,7 @@ record: some parts are for fitting, others for selecting, others for reporting.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -66,8 +66,13 @@ class Evidence:
         edges: (bands + 1,), first line of each band; band 0 is line 0, mean and slow motion.
     """
 
-    def __init__(self, records: RecordSet) -> None:
-        """Cut the records; raise InputError for a controller that is described badly."""
+    def __init__(self, records: RecordSet, nominal: Mapping[str, float]) -> None:
+        """Cut the records; raise InputError for a controller that is described badly.
+
+        Args:
+            records: the runs.
+            nominal: datasheet values by the names of PLANT.
+        """
         self.records = records
         rate = records.sample_rate_hz
         shortest = min(r.samples for r in records.records)
@@ -78,7 +83,7 @@ class Evidence:
         power = np.mean(np.concatenate(self._measured) ** 2, axis=0)
         self.lines = band_lines(power, self.noise.std_rad**2)
         self.edges = _edges(self.lines)
-        self.simulator = RecordSimulator(records, self.noise, self.lines * self.line_hz)
+        self.simulator = RecordSimulator(records, self.noise, self.lines * self.line_hz, nominal)
         self.parts = tuple(_parts(records, self.hop))
         self._band = np.searchsorted(self.edges, np.arange(self.lines), side="right") - 1
 

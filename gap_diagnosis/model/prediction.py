@@ -12,19 +12,26 @@ growing, at a price: below its crossover it hides part of what a wrong model doe
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.signal import cont2discrete
 
 from controller_node.transfer_function import TransferFunction
 from fjr_records.periodic import RecordedExperiment
 from fjr_sim_node.simulation.closed_loop import Trajectory
+from fjr_sim_node.theory import linear
 
 CROSSOVER_SHARE = 0.1
 """Crossover of the observer relative to the highest excited frequency, never below the lowest."""
 LEAD = 10.0
 """Ratio of pole to zero of the observer: 55 degrees of lead where the loop gain is one."""
+_HIGHEST = 0.05  # of the sample rate
+_STEP, _MOST_STEPS = 2.0**0.25, 16
+_MOST_SENSITIVE = 2.5
+_LEAST_DECAY = 0.003  # of a motion of the loop, per radian of the crossover
 _NEAR = 1.5  # lines within this factor of the crossover give the plant's gain there
 
 
@@ -67,6 +74,66 @@ def lead(gain: float, crossover_hz: float, sample_rate_hz: float) -> TransferFun
     zero, pole = centre / np.sqrt(LEAD), centre * np.sqrt(LEAD)
     high = gain * np.sqrt(LEAD)
     return TransferFunction.of([high * (1.0 + zero), high * (zero - 1.0)], [1.0 + pole, pole - 1.0])
+
+
+def model_observer(
+    nominal: Mapping[str, float], wanted_hz: float, sample_rate_hz: float
+) -> tuple[float, TransferFunction]:
+    """Return the crossover of an observer that holds a model well, and the observer.
+
+    It is the one nearest to what is wanted at which the loop of the lead and the linear nominal
+    model is damped and its sensitivity peaks below 2.5; so a model that is fitted to a motion does
+    not diverge for want of friction, and stays held while its parameters change. If there is none,
+    it is the one whose loop grows least.
+
+    Args:
+        nominal: datasheet values by the names of PLANT.
+        wanted_hz: crossover, if the model allows it.
+        sample_rate_hz: rate of the samples.
+    """
+    highest = _HIGHEST * sample_rate_hz
+    wanted = min(wanted_hz, highest)
+    growths = {}
+    for step in sorted(range(-_MOST_STEPS, _MOST_STEPS + 1), key=abs):
+        crossover = wanted * _STEP**step
+        if crossover > highest:
+            continue
+        gain = 1.0 / abs(complex(linear.g0(nominal, np.array(crossover), sample_rate_hz)))
+        law = lead(gain, crossover, sample_rate_hz)
+        growth = _growth(law, nominal, sample_rate_hz)
+        decays = 1.0 - _LEAST_DECAY * 2.0 * np.pi * crossover / sample_rate_hz
+        if growth < decays and _robust(law, nominal, sample_rate_hz):
+            return crossover, law
+        growths[growth] = crossover, law
+    return growths[min(growths)]
+
+
+def _growth(law: TransferFunction, nominal: Mapping[str, float], sample_rate_hz: float) -> float:
+    """Return the largest modulus of a pole of the loop of a first-order law and the linear model.
+
+    That of a free rotation of the link, which a rigid axis has besides, is left out.
+    """
+    a, b = linear.state_space(nominal)
+    position = np.zeros((1, len(a)))
+    position[0, 2] = 1.0
+    if math.isinf(nominal["k0"]):
+        a, b, position = a[2:, 2:], b[2:], position[:, 2:]
+    ad, bd, *_ = cont2discrete((a, b[:, None], position, np.zeros((1, 1))), 1.0 / sample_rate_hz)
+    (b0, b1), (_, a1) = law.position, law.denominator
+    # the law's state x: u = x + b0 e, then x = b1 e - a1 u, with e = -y
+    closed = np.block([
+        [ad - b0 * bd @ position, bd],
+        [(a1 * b0 - b1) * position, np.full((1, 1), -a1)],
+    ])  # fmt: skip
+    return float(np.abs(np.linalg.eigvals(closed)).max())
+
+
+def _robust(law: TransferFunction, nominal: Mapping[str, float], sample_rate_hz: float) -> bool:
+    """Tell whether the sensitivity of the loop peaks low enough."""
+    frequency = np.geomspace(1e-4, 0.4999, 2000) * sample_rate_hz
+    plant = linear.g0(nominal, frequency, sample_rate_hz)
+    loop = law.response(frequency, sample_rate_hz)[1] * plant
+    return bool(np.abs(1.0 + loop).min() >= 1.0 / _MOST_SENSITIVE)
 
 
 def loses(recorded: RecordedExperiment) -> str:

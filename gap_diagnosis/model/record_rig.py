@@ -6,23 +6,21 @@ drives the model, and an observer holds its motion to the recorded position (`pr
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from controller_node.transfer_function import TransferFunction
 from fjr_kit.errors import InputError
 from fjr_records.record_noise import RecordNoise
 from fjr_records.records import Record, RecordSet
 from fjr_sim_node.simulation.closed_loop import Trajectory, simulate_law
 
-from .prediction import CROSSOVER_SHARE, lead
+from .prediction import CROSSOVER_SHARE, model_observer
 from .record_loop import RecordLoop, loop_of
 from .simulated_rig import Model, run_parallel
 
 _AT_REST = 5.0  # standard deviations of noise that a record at rest may begin away from zero
 _FIRST_SAMPLES = 10
-_NEAR = 1.5  # lines within this factor of the crossover give the plant's gain there
 
 
 class RecordSimulator:
@@ -34,13 +32,16 @@ class RecordSimulator:
         crossover_hz: crossover of the observer.
     """
 
-    def __init__(self, records: RecordSet, noise: RecordNoise, top_hz: float) -> None:
+    def __init__(
+        self, records: RecordSet, noise: RecordNoise, top_hz: float, nominal: Mapping[str, float]
+    ) -> None:
         """Take the signals that drive the simulation.
 
         Args:
             records: the runs.
             noise: of their positions.
             top_hz: highest frequency at which the position holds a signal.
+            nominal: datasheet values by the names of PLANT, which the observer must hold.
 
         Raises:
             InputError: a controller that is described badly.
@@ -49,8 +50,9 @@ class RecordSimulator:
         self._rate = records.sample_rate_hz
         self.loop: RecordLoop = loop_of(records)
         self._starts = [_start(r, noise) for r in records.records]
-        self.crossover_hz = CROSSOVER_SHARE * top_hz
-        self._observer = _observer(records, self.crossover_hz)
+        self.crossover_hz, self._observer = model_observer(
+            nominal, CROSSOVER_SHARE * top_hz, self._rate
+        )
         self._entries = [
             law.entering_state(r.reference, r.position, r.torque)
             if start != (0.0, 0.0) and r.reference is not None
@@ -135,20 +137,3 @@ def _start(record: Record, noise: RecordNoise) -> tuple[float, float]:
         return float(first.mean()), 0.0
     speed, position = np.polyfit(time, first, 1)
     return float(position), float(speed)
-
-
-def _observer(records: RecordSet, crossover_hz: float) -> TransferFunction:
-    """Return a lead that crosses over with the measured response of torque to position."""
-    ratios = []
-    for record in records.records:
-        frequency = np.fft.rfftfreq(record.samples, 1.0 / records.sample_rate_hz)
-        with np.errstate(divide="ignore"):
-            apart = np.abs(np.log(frequency / crossover_hz))
-        near = apart <= max(np.log(_NEAR), apart.min())
-        window = np.hanning(record.samples)
-        u, y = (
-            np.abs(np.fft.rfft(window * (s - s.mean())))[near]
-            for s in (record.torque, record.position)
-        )
-        ratios.append(float(np.sqrt(np.sum(u**2) / max(np.sum(y**2), 1e-300))))
-    return lead(float(np.median(ratios)), crossover_hz, records.sample_rate_hz)

@@ -303,7 +303,9 @@ def test_piecewise_stiffness_has_its_slopes_and_no_jump():
 
 def test_piecewise_stiffness_of_ratio_one_is_the_bare_spring_and_of_zero_is_backlash():
     full = named("piecewise_stiffness", zone_rad=2e-3, soft_ratio=1.0)
-    assert np.allclose(torque_at(TWISTS, **full), K0 * TWISTS + K1 * TWISTS**3, rtol=1e-14, atol=0.0)
+    assert np.allclose(
+        torque_at(TWISTS, **full), K0 * TWISTS + K1 * TWISTS**3, rtol=1e-14, atol=0.0
+    )
     r = multisine_reference(7e-3)[:2000]
     zone = effects.coefficients(named("piecewise_stiffness", zone_rad=2e-3, soft_ratio=0.0))
     gap = effects.coefficients(named("backlash", half_gap_rad=2e-3))

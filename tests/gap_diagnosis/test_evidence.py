@@ -72,7 +72,7 @@ def records(effects=None, *, runs=1, seconds=8.0, known=True, scatter=0.0) -> Re
 @cache
 def biased() -> tuple[CellFitter, object, object]:
     """Return a fitter, its refit and the fit with a torque bias, of records that have one."""
-    fitter = CellFitter(Evidence(records(BIAS, scatter=0.02)), NOMINAL, 0.1)
+    fitter = CellFitter(Evidence(records(BIAS, scatter=0.02), NOMINAL), NOMINAL, 0.1)
     refit = fitter.refit()
     proposals = fitter.screening(refit, "torque_bias").proposals()
     return fitter, refit, fitter.add(refit, "torque_bias", proposals)
@@ -80,7 +80,7 @@ def biased() -> tuple[CellFitter, object, object]:
 
 @pytest.mark.parametrize(("runs", "whole"), [(1, False), (2, False), (3, True), (4, True)])
 def test_every_part_has_one_purpose_and_no_window_two(runs, whole):
-    evidence = Evidence(records(runs=runs, seconds=5.0))
+    evidence = Evidence(records(runs=runs, seconds=5.0), NOMINAL)
     purposes = {name: evidence.parts_for(name) for name in ("fit", "select", "report")}
     assert sorted(sum(purposes.values(), ())) == list(range(len(evidence.parts)))
     assert all(purposes.values())
@@ -95,7 +95,7 @@ def test_every_part_has_one_purpose_and_no_window_two(runs, whole):
 
 @pytest.mark.parametrize("known", [True, False])
 def test_the_true_model_leaves_noise_alone(known):
-    evidence = Evidence(records(BIAS, known=known))
+    evidence = Evidence(records(BIAS, known=known), NOMINAL)
     assert evidence.simulator.loop.kind == ("known" if known else "unknown")
     parts = tuple(range(len(evidence.parts)))
     errors = evidence.errors([Model(NOMINAL, BIAS), Model(NOMINAL, {})], parts)
@@ -105,7 +105,7 @@ def test_the_true_model_leaves_noise_alone(known):
 
 
 def test_a_motion_that_diverges_is_a_bad_value_and_no_error():
-    evidence = Evidence(records(seconds=5.0))
+    evidence = Evidence(records(seconds=5.0), NOMINAL)
     unstable = Model({**NOMINAL, "jm": 1e-5, "j": 1e-5, "k0": 1e8}, {})
     assert np.isfinite(evidence.errors([unstable], evidence.parts_for("fit"))).all()
 
@@ -141,7 +141,7 @@ def test_a_gain_by_one_part_or_one_that_does_not_repeat_is_no_presence():
 
 
 def test_nothing_is_gained_by_an_effect_that_is_not_there():
-    fitter = CellFitter(Evidence(records(scatter=0.02)), NOMINAL, 0.1)
+    fitter = CellFitter(Evidence(records(scatter=0.02), NOMINAL), NOMINAL, 0.1)
     refit = fitter.refit()
     for effect in ("torque_bias", "gravity", "quadratic_friction"):
         proposals = fitter.screening(refit, effect).proposals()
