@@ -175,12 +175,14 @@ def _notes(evidence: Evidence, found: Found) -> list[str]:
             "The noise of the position is not known: no repeats, no standstill, and the highest "
             "lines are not flat; so nothing is said of significance."
         )
-    if evidence.simulator.loop.kind == "unknown":
+    laws = evidence.simulator.loop.laws
+    if None in laws:
+        where = "" if not any(laws) else f" for {laws.count(None)} of {len(laws)} runs"
         notes.append(
-            "The loop is not known, so the recorded torque drives the model and an observer of "
-            f"{evidence.simulator.crossover_hz:.3g} Hz holds it to the recorded position: below "
-            "that, errors show smaller than they are, and the figures of the torque are those of "
-            "what the observer adds."
+            f"The loop is not known{where}, so there the recorded torque drives the model and an "
+            f"observer of {evidence.simulator.crossover_hz:.3g} Hz holds it to the recorded "
+            "position: below that, errors show smaller than they are, and the figures of the "
+            "torque are those of what the observer adds."
         )
     if not found.complete:
         notes.append(OUT_OF_TIME)

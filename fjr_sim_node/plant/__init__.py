@@ -21,6 +21,7 @@ from .flexible_joint import (
     coefficients,
     moves_as_one,
     rigid_sums,
+    steps_per_second,
     with_added,
 )
 
@@ -39,5 +40,6 @@ __all__ = [
     "coefficients",
     "moves_as_one",
     "rigid_sums",
+    "steps_per_second",
     "with_added",
 ]

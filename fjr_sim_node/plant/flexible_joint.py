@@ -161,6 +161,32 @@ def _advance(s, torque, w, duration, p, e):
 
 
 @jit
+def _rate(speed, torque, p):
+    return fastest_rate(0.0, (0.0, 0.0, 0.0, speed, 0.0, 0.0, 0.0), torque, p, None)
+
+
+@jit
+def _rate_with_effects(speed, torque, p, e):
+    s = (0.0, 0.0, 0.0, speed, 0.0, 0.0, 0.0)
+    return fastest_rate(0.0, s, torque, with_bristles(p, 1.0, e), e)
+
+
+def steps_per_second(
+    speed: float, torque: float, p: tuple[float, ...], e: tuple[float, ...] | None
+) -> float:
+    """Return how many steps a second of motion takes, at a motor speed (rad/s) and a torque (N m).
+
+    Args:
+        speed: of the motor (rad/s).
+        torque: motor torque (N m).
+        p: parameters from `coefficients`.
+        e: from `effects.coefficients`, or None.
+    """
+    rate = _rate(speed, torque, p) if e is None else _rate_with_effects(speed, torque, p, e)
+    return rate / _PHASE_PER_STEP
+
+
+@jit
 def advance(q, vq, th, vth, torque, duration, p):
     """Advance the bare plant under constant torque (zero-order hold).
 

@@ -25,7 +25,8 @@ from .simulated_rig import Model
 Purpose = Literal["fit", "select", "report"]
 
 WINDOWS = 24
-"""Windows into which the shortest record is cut, at least."""
+"""Windows into which the shortest record is cut, at least; a single record into twice as many,
+since it serves all purposes."""
 _LONGEST_WINDOW_S = 4.0
 _WINDOWS_PER_BLOCK = 2
 _PURPOSES: tuple[Purpose, ...] = ("fit", "select", "report")
@@ -76,7 +77,8 @@ class Evidence:
         self.records = records
         rate = records.sample_rate_hz
         shortest = min(r.samples for r in records.records)
-        hop = min(shortest / (WINDOWS + 1), 0.5 * _LONGEST_WINDOW_S * rate)
+        windows = WINDOWS if len(records.records) > 1 else 2 * WINDOWS
+        hop = min(shortest / (windows + 1), 0.5 * _LONGEST_WINDOW_S * rate)
         self.hop = max(2 * int(hop / 2), 8)
         self._measured = [lapped(r.position, self.hop) for r in records.records]
         self.noise: RecordNoise = record_noise(records)

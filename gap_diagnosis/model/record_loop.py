@@ -6,7 +6,7 @@ and position it must make the recorded torque. Unknown gains are solved from the
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -32,54 +32,84 @@ class RecordLoop:
     """The loop of a set of records.
 
     Attributes:
-        kind: whether it can be simulated, with gains that were known or solved for.
-        laws: the law of each record; empty for an unknown loop.
-        gains: gains that were solved for, by name.
+        kind: whether it can be simulated in any of them, with gains that were known or solved for.
+        laws: the law of each record; None where it is not known, or does not make the torque.
         notes: sentences on what was found.
     """
 
     kind: Loop
-    laws: tuple[TransferFunction, ...] = ()
-    gains: dict[str, float] | None = None
+    laws: tuple[TransferFunction | None, ...]
     notes: tuple[str, ...] = ()
 
 
 def loop_of(records: RecordSet) -> RecordLoop:
     """Find the loop of records.
 
+    One set of gains is solved for all records that do not state them, or a set for each where one
+    does not serve all, as of a servo whose gain was changed from run to run.
+
     Raises:
         InputError: a controller that is described badly.
     """
-    runs = records.records
-    if any(r.reference is None or not r.controller for r in runs):
-        return RecordLoop("unknown")
-    rate = records.sample_rate_hz
-    gains: dict[str, float] = {}
+    runs, rate = records.records, records.sample_rate_hz
+    described = [r for r in runs if r.reference is not None and r.controller]
+    if not described:
+        return RecordLoop("unknown", (None,) * len(runs))
+    solved = [r for r in described if unknown_gains(r.controller)]
     notes: list[str] = []
-    if unknown_gains(runs[0].controller):
-        gains = _solved(runs, rate)
-        notes.append(
-            "Gains of the controller solved from the recorded torque: "
-            + ", ".join(f"{name} = {value:.4g}" for name, value in gains.items())
-            + "."
-        )
-    laws = tuple(as_transfer_function(law_of(r.controller, rate, gains)) for r in runs)
-    worst = min(explained(law, r) for law, r in zip(laws, runs, strict=True))
-    if worst < FOLLOWS:
-        return RecordLoop(
-            "unknown",
-            notes=(
-                f"The described controller makes {max(worst, 0.0):.1%} of the recorded torque's "
-                "variance only, so its loop is not simulated; check the description, and whether "
-                "reference, position and torque are of one run and have their signs.",
-            ),
-        )
+    gains: dict[str, dict[str, float]] = {}
+    if solved:
+        common = _solved(solved, rate)
+        gains = {r.name: common for r in solved}
+        if min(explained(_law(r, rate, common), r) for r in solved) < FOLLOWS and len(solved) > 1:
+            gains = {r.name: _solved([r], rate) for r in solved}
+    laws = {r.name: _law(r, rate, gains.get(r.name, {})) for r in described}
+    shares = {r.name: explained(laws[r.name], r) for r in described}
+    follow = [r.name for r in described if shares[r.name] >= FOLLOWS]
+    notes += _gains_told({name: found for name, found in gains.items() if name in follow})
+    if len(follow) < len(described):
+        notes.append(_not_followed(shares, len(runs)))
+    worst = min((shares[name] for name in follow), default=1.0)
     if worst < EXACT:
         notes.append(
             f"The described controller makes {worst:.2%} of the recorded torque's variance, not "
             "all of it: the rest of the controller is part of the gap."
         )
-    return RecordLoop("gains_fitted" if gains else "known", laws, gains or None, tuple(notes))
+    kind: Loop = "unknown" if not follow else "gains_fitted" if gains else "known"
+    chosen = tuple(laws[r.name] if r.name in follow else None for r in runs)
+    return RecordLoop(kind, chosen, tuple(notes))
+
+
+def _law(record: Record, rate: float, gains: Mapping[str, float]) -> TransferFunction:
+    own = {name: gains[name] for name in unknown_gains(record.controller)}
+    return as_transfer_function(law_of(record.controller, rate, own))
+
+
+def _gains_told(gains: Mapping[str, Mapping[str, float]]) -> list[str]:
+    """Return the sentence on gains that were solved for, by run."""
+    if not gains:
+        return []
+    told = []
+    for name in next(iter(gains.values())):
+        values = [found[name] for found in gains.values()]
+        low, high = min(values), max(values)
+        told.append(f"{name} = {low:.4g}" if low == high else f"{name} = {low:.4g} to {high:.4g}")
+    one = len({tuple(found.items()) for found in gains.values()}) == 1
+    how = "" if one else ", run by run, since no one set makes the torque of all"
+    return [f"Gains of the controller solved from the recorded torque{how}: {', '.join(told)}."]
+
+
+def _not_followed(shares: Mapping[str, float], runs: int) -> str:
+    """Return the sentence on runs whose torque the described controller does not make."""
+    failed = [name for name, share in shares.items() if share < FOLLOWS]
+    worst = max(min(shares.values()), 0.0)
+    which = "any run" if len(failed) == runs else ", ".join(failed)
+    return (
+        f"The described controller does not make the recorded torque of {which} (as little as "
+        f"{worst:.1%} of its variance), so there the loop is not simulated; check the description, "
+        "whether reference, position and torque are of one run and have their signs, and whether "
+        "the drive was on."
+    )
 
 
 def explained(law: TransferFunction, record: Record) -> float:

@@ -13,6 +13,7 @@ import numpy as np
 from fjr_kit.errors import InputError
 from fjr_records.record_noise import RecordNoise
 from fjr_records.records import Record, RecordSet
+from fjr_sim_node import plant
 from fjr_sim_node.simulation.closed_loop import Trajectory, simulate_law
 
 from .prediction import CROSSOVER_SHARE, model_observer
@@ -21,6 +22,7 @@ from .simulated_rig import Model, run_parallel
 
 _AT_REST = 5.0  # standard deviations of noise that a record at rest may begin away from zero
 _FIRST_SAMPLES = 10
+_MOST_STEPS, _MOST_STEPS_A_SAMPLE = 1e6, 20.0  # of the integration of one run
 
 
 class RecordSimulator:
@@ -50,19 +52,21 @@ class RecordSimulator:
         self._rate = records.sample_rate_hz
         self.loop: RecordLoop = loop_of(records)
         self._starts = [_start(r, noise) for r in records.records]
+        self._speeds = [float(np.std(np.diff(r.position)) * self._rate) for r in records.records]
+        self._torques = [float(np.abs(r.torque).max()) for r in records.records]
         self.crossover_hz, self._observer = model_observer(
             nominal, CROSSOVER_SHARE * top_hz, self._rate
         )
         self._entries = [
             law.entering_state(r.reference, r.position, r.torque)
-            if start != (0.0, 0.0) and r.reference is not None
+            if law is not None and r.reference is not None and start != (0.0, 0.0)
             else None
-            for law, r, start in zip(self.loop.laws, records.records, self._starts, strict=False)
+            for law, r, start in zip(self.loop.laws, records.records, self._starts, strict=True)
         ]
 
     def response(self, frequency_hz: np.ndarray, index: int) -> np.ndarray:
         """Return C_y of what holds a run: its controller, or the observer; complex, N m/rad."""
-        law = self._observer if self.loop.kind == "unknown" else self.loop.laws[index]
+        law = self.loop.laws[index] or self._observer
         return law.response(frequency_hz, self._rate)[1]
 
     def run(self, models: Sequence[Model], which: Sequence[int]) -> list[list[np.ndarray]]:
@@ -74,7 +78,7 @@ class RecordSimulator:
 
         Returns:
             for each model, for each run, float64 (3, samples): rad, N m, rad; NaN where the motion
-            diverges.
+            diverges, or is too stiff to be followed in reasonable time.
         """
         jobs = [(model, index) for model in models for index in which]
         found = run_parallel(self._one, jobs)
@@ -105,19 +109,29 @@ class RecordSimulator:
 
     def _one(self, job: tuple[Model, int]) -> np.ndarray:
         model, index = job
+        if self._too_stiff(model, index):
+            return np.full((3, self.records.records[index].samples), np.nan)
         try:
             run = self._simulated(model, index)
         except InputError:
             return np.full((3, self.records.records[index].samples), np.nan)
         return np.array([run.position, run.torque, run.motor if model.rigid else run.link])
 
+    def _too_stiff(self, model: Model, index: int) -> bool:
+        """Tell whether a model would take so long to play as no record can call for."""
+        record, (p, e) = self.records.records[index], _coefficients(model)
+        seconds = record.samples / self._rate
+        steps = seconds * plant.steps_per_second(self._speeds[index], self._torques[index], p, e)
+        return bool(steps > max(_MOST_STEPS, _MOST_STEPS_A_SAMPLE * record.samples))
+
     def _simulated(self, model: Model, index: int) -> Trajectory:
-        if self.loop.kind == "unknown":
+        law = self.loop.laws[index]
+        if law is None:
             return self._observed(model, index)
         record, (p, e) = self.records.records[index], _coefficients(model)
         assert record.reference is not None
         return simulate_law(
-            record.reference, self._rate, p, self.loop.laws[index], None, e,
+            record.reference, self._rate, p, law, None, e,
             start=self._starts[index], controller_state=self._entries[index],
         )  # fmt: skip
 

@@ -81,12 +81,17 @@ def _lead(investigation: RecordInvestigation) -> str:
 
 def _method(investigation: RecordInvestigation) -> str:
     simulator = investigation.evidence.simulator
-    if simulator.loop == "known":
-        return "The closed loop is simulated from the true start of each record."
-    return (
-        "The recorded torque drives the model, and an observer of "
+    laws = simulator.loop.laws
+    loop = "The closed loop is simulated from the true start of each record."
+    observed = (
+        "the recorded torque drives the model, and an observer of "
         f"{simulator.crossover_hz:.3g} Hz holds it to the recorded position."
     )
+    if None not in laws:
+        return loop
+    if not any(laws):
+        return f"{observed[0].upper()}{observed[1:]}"
+    return f"{loop} In {laws.count(None)} of {len(laws)}, whose controller is not known, {observed}"
 
 
 def _bags(investigation: RecordInvestigation) -> list[str]:

@@ -1,4 +1,4 @@
-"""The observer that holds a model to a recorded motion, on rigs of any kind, with friction or none."""
+"""The observer that holds a model to a recorded motion, on rigs of any kind."""
 
 from __future__ import annotations
 
