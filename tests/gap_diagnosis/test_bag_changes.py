@@ -113,7 +113,8 @@ def test_one_bag_more_than_levels_cannot_tell_a_trend_from_scatter():
 def test_a_diagnosis_of_a_rig_whose_friction_scatters_tells_the_scatter(tmp_path):
     small = simulate_case(seed=3, realizations=4, base_frequency_hz=0.5, levels_rad=(5e-3, 2e-2))
     recorded, drawn = scattered(small, 0.02, 1)
-    diagnosis = investigate(recorded, {**small.truth.plant}).diagnosis
+    few = ("presliding_friction", "stribeck_friction_motor", "torque_gain")
+    diagnosis = investigate(recorded, {**small.truth.plant}, effects=few).diagnosis
     assert diagnosis.verdict != "nonstationary"
     assert any("scatters" in note for note in diagnosis.notes)
     path = tmp_path / "diagnosis.json"
