@@ -12,12 +12,13 @@ from fjr_records.records import Record, RecordSet
 from fjr_sim_node import effects as fx
 
 from .model.evidence import Evidence
+from .model.record_torque import CONTINUOUS, with_continuous_torque
 from .model.simulated_rig import Model
 from .notes import OUT_OF_TIME
 from .outcome.diagnosis import Diagnosis
 from .record_judgement import FEWEST_PARTS, Tested, judge_records, tested_causes
 from .which.catalogue import catalogue
-from .which.cell_fits import CellFitter
+from .which.cell_fits import CellFit, CellFitter
 from .which.search_space import TOLERANCE
 from .which.stepwise import Found, Stepwise, gain, stands_for
 
@@ -81,16 +82,48 @@ def investigate_records(
     names = catalogue(model.plant, effects)
     records, cut = _within(records)
     progress("windows and noise")
-    evidence = Evidence(records, nominal)
-    fitter = CellFitter(evidence, model.plant, tolerance)
-    found = Stepwise(fitter, names, progress, begun + budget_s).run()
+    fitter, refit, heard = _refitted(records, nominal, tolerance, progress)
+    evidence = fitter.evidence
+    found = Stepwise(fitter, names, progress, begun + budget_s).run(refit)
     found, tested = _kept(fitter, found, progress)
     progress("what may stand in for a cause")
     alternatives = {t.effect: _alternatives(fitter, found, t, names) for t in tested}
     progress("judgement")
-    notes = [*records.notes, *cut, *_notes(evidence, found)]
+    notes = [*records.notes, *cut, *heard, *_notes(evidence, found)]
     diagnosis = judge_records(fitter, model, found, tested, alternatives, notes)
     return RecordInvestigation(evidence, model, found, tuple(tested), diagnosis)
+
+
+def _refitted(
+    records: RecordSet, nominal: Mapping[str, float], tolerance: float, progress: Progress
+) -> tuple[CellFitter, CellFit, list[str]]:
+    """Return the fit of the base parameters, with a torque that acts as unseen parts call for.
+
+    Where no loop makes it, the recorded torque drives the model: held, unless it does clearly
+    better as a signal. Both may come late, so that half a sample of delay decides nothing.
+    """
+    plant = Model.nominal(nominal).plant
+    progress("refit of the base parameters")
+    fitter = CellFitter(Evidence(records, nominal), plant, tolerance)
+    refit, loop = fitter.refit(), fitter.evidence.simulator.loop
+    if None not in loop.laws:
+        return fitter, refit, []
+    progress("refit with a torque that is not held")
+    flowing = with_continuous_torque(records, loop)
+    other = CellFitter(Evidence(flowing, nominal), plant, tolerance)
+    again = other.refit()
+    if gain(fitter, _late(other, again), _late(fitter, refit)).present:
+        return other, again, [CONTINUOUS]
+    return fitter, refit, []
+
+
+def _late(fitter: CellFitter, refit: CellFit) -> CellFit:
+    """Return a fit with a delay, where that gains."""
+    proposals = fitter.screening(refit, "delay").proposals()
+    delayed = fitter.add(refit, "delay", proposals) if proposals else None
+    if delayed is None or fitter.gains(delayed, refit).sum() <= 0.0:
+        return refit
+    return delayed
 
 
 def _within(records: RecordSet) -> tuple[RecordSet, list[str]]:

@@ -116,10 +116,9 @@ class Stepwise:
         """
         self._fitter, self._effects, self._progress, self._until = fitter, effects, progress, until
 
-    def run(self) -> Found:
-        """Search forward, then drop what is not needed."""
-        self._progress("refit of the base parameters")
-        found = Found([self._fitter.refit()])
+    def run(self, refit: CellFit) -> Found:
+        """Search forward from the fit of the base parameters alone."""
+        found = Found([refit])
         while len(found.best.effects) < MOST_CAUSES:
             if self._over:
                 found.complete = False
