@@ -29,7 +29,7 @@ def test_the_mean_of_a_sine_over_each_sample_is_that_of_the_sine(cycles, phase):
 
 
 def runs(finer: int) -> RecordSet:
-    """Return runs of unknown loops of controllers that work at so many times the rate of the bags."""
+    """Return runs of unknown loops whose controllers work at a multiple of the rate of the bags."""
     made = []
     for number in range(4):
         rate, rng = RATE * finer, np.random.default_rng(number)
