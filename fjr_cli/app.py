@@ -9,6 +9,7 @@ called, so that `fjr --help` is quick, and prints what came of it. Errors become
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Annotated
 
 import typer
 
@@ -40,8 +41,29 @@ app = typer.Typer(
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
-    help="Run, rehearse and analyze identification experiments on a flexible-joint rig.",
 )
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from fjr_kit.installed import product_version
+
+        typer.echo(f"fjr {product_version()}")
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    _: Annotated[
+        bool,
+        typer.Option(
+            "--version", callback=_print_version, is_eager=True, help="Print the version and end."
+        ),
+    ] = False,
+) -> None:
+    """Run, rehearse and analyze identification experiments on a flexible-joint rig."""
+
+
 app.command()(analyze)
 app.command("import")(import_records)
 for command in COMMANDS:
