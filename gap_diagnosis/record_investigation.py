@@ -169,7 +169,7 @@ def _kept(fitter: CellFitter, found: Found, progress: Progress) -> tuple[Found, 
     steps, tested = list(found.steps), []
     while steps[-1].effects:
         progress(f"tests of {' + '.join(steps[-1].effects)}")
-        tested = tested_causes(fitter, steps[-1], fitter.groups)
+        tested = tested_causes(fitter, steps[-1], steps[0], fitter.groups)
         failed = [t for t in tested if not t.passed]
         if not failed:
             break

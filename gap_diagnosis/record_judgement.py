@@ -16,6 +16,7 @@ from .outcome.diagnosis import (
     Cause,
     Diagnosis,
     EvidenceKind,
+    Figure,
     Gap,
     Gaps,
     ReportedOn,
@@ -56,6 +57,7 @@ class Tested:
         without: the fit that lacks it.
         invariance_p: see `invariance`; None with one level.
         certain: whether the interval of its size lacks zero, and no parameter is at its bound.
+        share: how much of what the refit left comes back without it, on unseen parts that select.
     """
 
     effect: str
@@ -63,12 +65,14 @@ class Tested:
     without: CellFit
     invariance_p: float | None
     certain: bool
+    share: Figure
 
     @property
     def passed(self) -> bool:
         """Whether the cause is called present."""
         same = self.invariance_p is None or self.invariance_p >= LEAST_INVARIANCE_P
-        return self.gain.present and self.certain and same
+        closes = self.share.low is None or not self.share.low <= 0.0  # NaN: one part says nothing
+        return self.gain.present and self.certain and same and closes
 
     @property
     def present(self) -> float:
@@ -81,9 +85,12 @@ class Tested:
         return min(sure, 0.99)
 
 
-def tested_causes(fitter: CellFitter, fit: CellFit, groups: np.ndarray) -> list[Tested]:
+def tested_causes(
+    fitter: CellFitter, fit: CellFit, refit: CellFit, groups: np.ndarray
+) -> list[Tested]:
     """Return every cause of a fit with its tests, all others fitted anew without it."""
     estimates = cell_estimates(fit, groups)
+    ledger = Ledger(fitter.evidence, fitter.select_parts)
     found = []
     for effect in fit.effects:
         without = fitter.without(fit, effect)
@@ -94,6 +101,7 @@ def tested_causes(fitter: CellFitter, fit: CellFit, groups: np.ndarray) -> list[
                 without,
                 invariance(fitter, fit, effect),
                 beyond_zero(effect, estimates) and not at_its_bound(fit, effect),
+                ledger.share(without.model, fit.model, refit.model),
             )
         )
     return found

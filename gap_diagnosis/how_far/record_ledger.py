@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -16,12 +17,12 @@ _MOST_PLACES = 4
 
 
 class Ledger:
-    """Figures of models on the parts that report."""
+    """Figures of models on some parts."""
 
-    def __init__(self, evidence: Evidence) -> None:
-        """Take the evidence; the parts that select stand in where none reports."""
+    def __init__(self, evidence: Evidence, parts: Sequence[int] | None = None) -> None:
+        """Take the evidence and the parts, by default those that report or stand in for them."""
         self.evidence = evidence
-        self.parts = evidence.reporting
+        self.parts = tuple(evidence.reporting if parts is None else parts)
         self.runs = sorted({evidence.parts[p].record for p in self.parts})
         self._part = evidence.part_of(self.parts)
         energy = {
@@ -33,7 +34,7 @@ class Ledger:
         self._floor = evidence.floor(self.parts)[evidence.cell_of(self.parts)]
 
     def squares(self, model: Model) -> np.ndarray:
-        """Return the squared error over the squared motion of each reporting part, (parts,)."""
+        """Return the squared error over the squared motion of each part, (parts,)."""
         errors = self.evidence.errors([model], self.parts)[0]
         place = {part: k for k, part in enumerate(self.parts)}
         part = np.array([place[p] for p in self._part])
