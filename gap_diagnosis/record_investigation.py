@@ -30,6 +30,10 @@ LONGEST_S = 300.0
 """Of all records together, what is played at the most (s)."""
 
 
+_SEARCH_SHARE = 0.6
+"""Of the budget for the search; the tests of what it found take about as long as one more step."""
+
+
 @dataclass(frozen=True)
 class RecordInvestigation:
     """Everything that a diagnosis of records rests on.
@@ -70,7 +74,7 @@ def investigate_records(
         nominal: datasheet values by the names of PLANT.
         tolerance: how far one may be off, relative.
         effects: identifiers to look for; None for all.
-        budget_s: time after which nothing new is tried.
+        budget_s: time for search and tests together; what is begun is ended.
         progress: told what is done.
 
     Raises:
@@ -84,7 +88,7 @@ def investigate_records(
     progress("windows and noise")
     fitter, refit, heard = _refitted(records, nominal, tolerance, progress)
     evidence = fitter.evidence
-    found = Stepwise(fitter, names, progress, begun + budget_s).run(refit)
+    found = Stepwise(fitter, names, progress, begun + _SEARCH_SHARE * budget_s).run(refit)
     found, tested = _kept(fitter, found, progress)
     progress("what may stand in for a cause")
     alternatives = {t.effect: _alternatives(fitter, found, t, names) for t in tested}
