@@ -21,6 +21,8 @@ FLOORS = 3.0
 
 _REPEATABILITY = 1e-3
 _STEP = 0.02
+_REFIT_STEPS = 5
+_FARTHEST = 1.5  # factor on a parameter in one step
 
 Player = Callable[[Mapping[str, float], Mapping[str, float]], list[np.ndarray]]
 """Returns y of the first run of each level for a plant and settings, without noise."""
@@ -42,8 +44,9 @@ class Visibility:
             for noise, signal in zip(averaged, self._signal, strict=True)
         ]
         self._base = self._weighed(base)
-        slopes = [self._slope(name) for name in _free(plant)]
-        self._basis = np.linalg.qr(np.array(slopes).T)[0]
+        self._names = _free(plant)
+        self._slopes = np.array([self._slope(name) for name in self._names]).T
+        self._basis = np.linalg.qr(self._slopes)[0]
 
     def change(self, plant: Mapping[str, float], settings: Mapping[str, float]) -> np.ndarray:
         """Return the change by settings from the bare plant, real (equations,)."""
@@ -56,6 +59,36 @@ class Visibility:
     def left(self, change: np.ndarray) -> np.ndarray:
         """Return what a refit of the bare parameters cannot take over."""
         return change - self._basis @ (self._basis.T @ change)
+
+    def left_by_refit(
+        self,
+        target: Sequence[np.ndarray],
+        play: Callable[[Mapping[str, float]], Sequence[np.ndarray]],
+    ) -> np.ndarray:
+        """Return what a refit of the bare parameters leaves of target positions, (equations,).
+
+        A large effect may bend the parameters so far that slopes at the true ones mislead: an
+        eccentric encoder scales them all, and then hardly shows. So the refit is carried out, by
+        Gauss-Newton steps with the slopes of the bare plant.
+
+        Args:
+            target: positions with the effect.
+            play: returns positions without it for other bare parameters.
+
+        Raises:
+            Unsuitable: the motion diverges on the way.
+        """
+        plant, best = dict(self._plant), None
+        for _ in range(_REFIT_STEPS):
+            change = self.between(target, play(plant))
+            if best is not None and self.share(change) >= self.share(best):
+                break
+            best = change
+            steps = np.linalg.lstsq(self._slopes, change, rcond=None)[0]
+            for name, step in zip(self._names, steps.tolist(), strict=True):
+                plant[name] *= min(max(1.0 + step, 1.0 / _FARTHEST), _FARTHEST)
+        assert best is not None
+        return self.left(best)
 
     def relative(self, change: np.ndarray) -> float:
         """Return how far a change shows once refitted, over what the detection limit shows."""

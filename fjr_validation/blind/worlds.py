@@ -46,6 +46,7 @@ _WEAK = (1e-3, 5e-3)  # of a weak effect of the catalogue
 _WEAK_SHARE = 0.5
 _LARGEST = 0.6  # of a dominant cause
 _ATTEMPTS = 60
+_AFTER_REFIT = 0.7  # of what linear slopes promise must be left by a full refit
 
 
 @dataclass(frozen=True)
@@ -198,8 +199,15 @@ class _Case:
 
         size = size_showing(at, target, draw.start, draw.most)
         if size is None and least is not None and at(draw.most) >= least:
-            return draw.most
-        return size
+            size = draw.most
+        if size is None:
+            return None
+        with_it = self._stage.positions(self._stage.plant, draw.settings(size), 0.0)
+        left = self._visibility.left_by_refit(with_it, self._bare)
+        return size if shown(left) >= _AFTER_REFIT * min(target, at(size)) else None
+
+    def _bare(self, plant: Mapping[str, float]) -> list[np.ndarray]:
+        return self._stage.positions(plant, {}, 0.0)
 
     def _settings(self, parts: Sequence[_Sized]) -> dict[str, float]:
         """Return the settings of effects together."""
@@ -240,14 +248,18 @@ class _Case:
 
         def cause(part: _Sized) -> Cause:
             others = [other for other in every if other is not part]
+            settings = self._settings(others)
             change = between(full, self._positions(others, self._scatter))
+            left = self._visibility.left_by_refit(
+                full, lambda plant: stage.positions(plant, settings, self._scatter)
+            )
             beside = self._world != "closed"
             return Cause(
                 part.draw.name,
-                self._visibility.relative(change),
-                self._left(change) / self._left(rest) if beside else None,
+                self._visibility.relative(left),
+                self._visibility.share(left) / self._left(rest) if beside else None,
                 self._visibility.share(change) / self._visibility.share(rest) if beside else None,
-                self._left(change) / gap,
+                self._visibility.share(left) / gap,
                 part.draw.truth(part.settings),
             )
 

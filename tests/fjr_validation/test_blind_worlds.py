@@ -197,6 +197,16 @@ def test_what_a_refit_takes_over_does_not_show(drawn):
     )
 
 
+def test_a_large_change_that_a_refit_takes_over_is_left_to_it_however_far_it_bends(drawn):
+    """As an eccentric encoder scales all parameters: slopes alone would call that visible."""
+    seen = Visibility(drawn.excitation.firsts, drawn.positions, drawn.plant, drawn.noise_rad)
+    target = drawn.positions({name: 1.4 * value for name, value in drawn.plant.items()}, {})
+    linear = seen.left(seen.between(target, drawn.positions(drawn.plant, {})))
+    refitted = seen.left_by_refit(target, lambda plant: drawn.positions(plant, {}))
+    assert seen.relative(linear) > 1.0  # of the detection limit
+    assert seen.relative(refitted) < 0.1
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("world", WORLDS)
 def test_a_case_is_made_again_from_its_number_and_reads_as_an_experiment(world, tmp_path):
