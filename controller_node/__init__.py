@@ -4,7 +4,8 @@ Reference and measured position go in, motor torque comes out. Begin with `pd_fi
 default law, paper eq. 12); `transfer_function` is any other linear law, `structures` are those that
 have names (PID, cascades), `controller_file` the form in which a user states one, `law` makes the
 law of a description, `gains` names what is unknown of it. `safety` holds limits and trips,
-`supervised_law` puts the law behind them, `real_time` answers on the wall clock, `node` speaks ROS.
+`supervised_law` puts the law behind them, `lockstep` answers each position with its reference,
+`real_time` on the wall clock, `node` speaks ROS.
 
     >>> from controller_node import CONTROLLER, describe
     >>> describe(CONTROLLER.check({"p": 150.0}))  # as an experiment description holds it
