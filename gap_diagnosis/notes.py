@@ -4,18 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import numpy as np
+
 from .gates.gate_checks import GateReport
 from .outcome.diagnosis import Verdict
 from .outcome.verdict_words import ROUNDING
 from .which.attribution import Attribution
 from .which.confidence import UNTESTED
 from .which.fits import Fit
+from .which.search_space import Space
 
 NOT_HELD_OUT = (
     "Nothing was held out, since every level has one realization: all figures are those of the fit "
     "itself, no prediction was tested, and the confidence is at most "
     f"{UNTESTED:.0%}; record two or more realizations of each level."
 )
+_AT_LIMIT = 0.01  # of the way from the datasheet to the bound
 OUT_OF_TIME = "The time budget ended the search before all effects were tried."
 
 
@@ -106,3 +110,26 @@ def rounding(step: float, left: float, made: float, misfits: tuple[float, float]
         f"its rms, the refit leaves {left:.2%}: {misfits[0]:.3g} times what noise explains, "
         f"{misfits[1]:.3g} times what noise and rounding explain."
     )
+
+
+def at_limits(space: Space, x: np.ndarray, plant: Mapping[str, float]) -> list[str]:
+    """Return a note on inertias and stiffness that ended as far from the datasheet as fits may go.
+
+    Args:
+        space: of the fit.
+        x: where it ended.
+        plant: the base parameters there.
+    """
+    low, high = space.bounds()
+    told = []
+    for k, (name, stated) in enumerate(space.nominal.items()):
+        ended = low[k] < high[k] and min(x[k] - low[k], high[k] - x[k]) < _AT_LIMIT * high[k]
+        if name in ("jm", "j", "k0") and ended:
+            off = 100.0 * (plant[name] / stated - 1.0)
+            told.append(f"{name} {abs(off):.0f} % {'above' if off > 0.0 else 'below'}")
+    if not told:
+        return []
+    return [
+        f"The fit ends as far from the datasheet as it may go ({', '.join(told)} it): check units "
+        "of the datasheet and the factor of the torque, or give a greater --tolerance."
+    ]

@@ -14,7 +14,7 @@ from fjr_sim_node import effects as fx
 from .model.evidence import Evidence
 from .model.record_torque import CONTINUOUS, with_continuous_torque
 from .model.simulated_rig import Model
-from .notes import OUT_OF_TIME
+from .notes import OUT_OF_TIME, at_limits
 from .outcome.diagnosis import Diagnosis
 from .record_judgement import FEWEST_PARTS, Tested, judge_records, tested_causes
 from .which.catalogue import catalogue
@@ -221,6 +221,8 @@ def _notes(evidence: Evidence, found: Found) -> list[str]:
             "position: below that, errors show smaller than they are, and the figures of the "
             "torque are those of what the observer adds."
         )
+    best = found.best
+    notes += at_limits(best.space, best.solution.x, best.model.plant)
     if not found.complete:
         notes.append(OUT_OF_TIME)
     return notes

@@ -16,6 +16,7 @@ from fjr_sim_node.plant import PLANT, coefficients
 from fjr_sim_node.simulation.closed_loop import simulate
 from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.model.simulated_rig import Model
+from gap_diagnosis.notes import at_limits
 from gap_diagnosis.which.cell_fits import CellFitter
 from gap_diagnosis.which.presence import at_its_bound, beyond_zero, cell_estimates, invariance
 from gap_diagnosis.which.stepwise import Gain, gain
@@ -130,6 +131,15 @@ def test_a_true_cause_is_the_same_at_all_levels_and_a_substitute_is_not():
     moved = fit.solution.residuals + shift * fit.solution.jacobian[:, column]
     wrong = replace(fit, solution=replace(fit.solution, residuals=moved))
     assert invariance(fitter, wrong, "torque_bias") < 1e-3
+
+
+@pytest.mark.parametrize(("stated", "words"), [(1.0, None), (0.3, "(jm 69 % above it)")])
+def test_a_datasheet_in_a_wrong_unit_is_told_by_the_bound_at_which_the_fit_ends(stated, words):
+    nominal = {**NOMINAL, "jm": stated * NOMINAL["jm"]}
+    refit = CellFitter(Evidence(records(seconds=5.0), nominal), nominal, 0.1).refit()
+    said = at_limits(refit.space, refit.solution.x, refit.model.plant)
+    assert len(said) == (words is not None)
+    assert words is None or words in said[0]
 
 
 def test_a_gain_by_one_part_or_one_that_does_not_repeat_is_no_presence():
