@@ -133,7 +133,7 @@ def test_a_true_cause_is_the_same_at_all_levels_and_a_substitute_is_not():
     assert invariance(fitter, wrong, "torque_bias") < 1e-3
 
 
-@pytest.mark.parametrize(("stated", "words"), [(1.0, None), (0.3, "(jm 69 % above it)")])
+@pytest.mark.parametrize(("stated", "words"), [(1.0, None), (3.0, "(jm 41 % below it)")])
 def test_a_datasheet_in_a_wrong_unit_is_told_by_the_bound_at_which_the_fit_ends(stated, words):
     nominal = {**NOMINAL, "jm": stated * NOMINAL["jm"]}
     refit = CellFitter(Evidence(records(seconds=5.0), nominal), nominal, 0.1).refit()
