@@ -152,7 +152,9 @@ def test_resuming_makes_only_what_is_missing_with_the_same_bytes(run, tmp_path):
 def test_interrupted_run_keeps_bags_and_resumes_to_the_same_bytes(
     tmp_path, start: Starter, signal_number
 ):
-    options = ["--realizations", "3", "--periods", "3", "--transient-periods", "0"]
+    options = ["--realizations", "3", "--periods", "3", "--transient-periods", "0",
+               "--set", "excitation.base_frequency_hz=0.25",
+               "--set", "excitation.f_min_hz=0.25"]  # fmt: skip
     out = tmp_path / "x"
     run = start("fjr_cli", "run", "--out", str(out), *options)
     first, second = bag_folder(out, 0, 0), out / f".{bag_folder(out, 0, 1).name}.partial"
