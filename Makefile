@@ -33,17 +33,24 @@ PYTEST := PYTEST_DISABLE_PLUGIN_AUTOLOAD=1 $(BIN)/python -m pytest -p xdist.plug
 
 COLCON := $(abspath $(BIN))/colcon --log-base log
 
-.PHONY: help demo test ws bench lint lock clean check-machine
+# What tells soon whether a change broke something: no nodes, no diagnosis from bags to report.
+QUICK := $(addprefix tests/,docs controller_node excitation_node fjr_records fjr_sim_node/test_plant.py \
+  fjr_sim_node/test_effects_of_drive_and_gear.py gap_diagnosis/test_evidence.py gap_diagnosis/test_record_loop.py)
+
+.PHONY: help demo test test-quick ws bench lint lock clean check-machine
 
 help: ## show the targets
-	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 10
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 12
 	echo 'Another Python: make demo PYTHON=python3.12'
 
 demo: $(INSTALLED) ## install everything, run a campaign on the ROS graph, write its report
 	@$(BIN)/fjr demo
 
-test: $(INSTALLED) ## install everything, run the tests
+test: $(INSTALLED) ## install everything, run the tests: 20 to 35 minutes on two cores
 	@$(PYTEST) -n 2 --dist loadfile --no-loadscope-reorder
+
+test-quick: $(INSTALLED) ## run the tests of the cores that take least: one or two minutes
+	@$(PYTEST) -n 2 --dist loadfile -m 'not ros and not slow' $(QUICK)
 
 ws: $(INSTALLED) ## build the ROS packages in ros_ws with colcon, test what was installed
 	@cd ros_ws
