@@ -45,8 +45,8 @@ class RecordLoop:
 def loop_of(records: RecordSet) -> RecordLoop:
     """Find the loop of records.
 
-    One set of gains is solved for all records that do not state them, or a set for each where one
-    does not serve all, as of a servo whose gain was changed from run to run.
+    One set of gains is solved for all records of one controller that does not state them, or a set
+    for each where one does not serve all, as of a servo whose gain was changed from run to run.
 
     Raises:
         InputError: a controller that is described badly.
@@ -59,9 +59,10 @@ def loop_of(records: RecordSet) -> RecordLoop:
     notes: list[str] = []
     gains: dict[str, dict[str, float]] = {}
     if solved:
-        common = _solved(solved, rate)
+        one = all(r.controller == solved[0].controller for r in solved)
+        common = _solved(solved, rate) if one else {}
         gains = {r.name: common for r in solved}
-        if min(explained(_law(r, rate, common), r) for r in solved) < FOLLOWS and len(solved) > 1:
+        if not one or min(explained(_law(r, rate, common), r) for r in solved) < FOLLOWS:
             gains = {r.name: _solved([r], rate) for r in solved}
     laws = {r.name: _law(r, rate, gains.get(r.name, {})) for r in described}
     shares = {r.name: explained(laws[r.name], r) for r in described}
@@ -90,8 +91,8 @@ def _gains_told(gains: Mapping[str, Mapping[str, float]]) -> list[str]:
     if not gains:
         return []
     told = []
-    for name in next(iter(gains.values())):
-        values = [found[name] for found in gains.values()]
+    for name in dict.fromkeys(name for found in gains.values() for name in found):
+        values = [found[name] for found in gains.values() if name in found]
         low, high = min(values), max(values)
         told.append(f"{name} = {low:.4g}" if low == high else f"{name} = {low:.4g} to {high:.4g}")
     one = len({tuple(found.items()) for found in gains.values()}) == 1

@@ -14,9 +14,11 @@ from fjr_records.records import Record, RecordSet
 from fjr_sim_node import effects as fx
 from fjr_sim_node.plant import PLANT, coefficients
 from fjr_sim_node.simulation.closed_loop import simulate
+from gap_diagnosis import record_judgement
 from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.model.simulated_rig import Model
 from gap_diagnosis.notes import at_limits
+from gap_diagnosis.outcome.diagnosis import Figure
 from gap_diagnosis.which.cell_fits import CellFitter
 from gap_diagnosis.which.presence import at_its_bound, beyond_zero, cell_estimates, invariance
 from gap_diagnosis.which.stepwise import Gain, gain
@@ -119,6 +121,17 @@ def test_a_cause_is_fitted_beside_friction_that_scatters():
     assert bias.low < 1.5 < bias.high and bias.high - bias.low < 0.3
     assert beyond_zero("torque_bias", cell_estimates(fit, fitter.groups))
     assert not at_its_bound(fit, "torque_bias")
+
+
+def test_a_cause_without_which_nothing_of_the_gap_comes_back_is_not_present():
+    fitter, refit, fit = biased()
+    (tested,) = record_judgement.tested_causes(fitter, fit, refit, fitter.groups)
+    assert 0.5 < tested.share.low < tested.share.high < 1.05
+    tested = replace(tested, gain=Gain(mean=10.0, without_best=8.0, share=1.0, p=0.002))
+    assert tested.passed
+    closes_nothing = Figure(value=-0.02, low=-0.03, high=-0.01)
+    assert not replace(tested, share=closes_nothing).passed
+    assert not replace(tested, share=Figure(value=0.01, low=-0.01, high=0.03)).passed
 
 
 def test_a_true_cause_is_the_same_at_all_levels_and_a_substitute_is_not():

@@ -53,6 +53,14 @@ def test_a_gain_that_was_changed_is_solved_run_by_run_and_the_loop_is_repeated()
         assert np.abs(played[0] - run.position).max() < 1e-3 * np.abs(run.position).max()
 
 
+def test_controllers_that_lack_different_gains_are_each_solved():
+    other = {"kind": "pd", "p": 400.0, "d": None, "n": 200.0, "unknown": ["d"]}
+    runs = (record(0, 300.0, HALF_KNOWN), record(1, 400.0, other))
+    loop = loop_of(RecordSet("test", RATE, runs))
+    assert loop.kind == "gains_fitted" and None not in loop.laws
+    assert "p = 300, d = 60" in loop.notes[0]
+
+
 def test_a_run_whose_torque_the_controller_does_not_make_is_driven_by_its_torque():
     """As where the drive was off: the others are still simulated in closed loop."""
     runs = (
