@@ -12,18 +12,19 @@ BIN := $(VENV)/bin
 ifdef ROS_DISTRO
 RCLPY := installed
 LOCK := requirements-installed-ros.lock
-EXTRAS := report,dask,dev
+EXTRAS := report,dask,export,rivals,dev
 VENV_OPTIONS := --system-site-packages
 else
 RCLPY := wheels
 LOCK := requirements.lock
-EXTRAS := report,dask,dev,ros
+EXTRAS := report,dask,export,rivals,dev,ros
 VENV_OPTIONS :=
 endif
 
 PYTHON_VERSION := $(shell $(PYTHON) -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2>/dev/null)
 INSTALLED := $(VENV)/.installed-$(RCLPY)-python$(PYTHON_VERSION)
 BENCH_INSTALLED := $(INSTALLED)-bench
+DOCS_INSTALLED := $(INSTALLED)-docs
 
 # The lock is given as constraints: what is installed is decided by pyproject.toml, its version here.
 PIP_INSTALL := $(BIN)/python -m pip install --quiet --use-pep517 --disable-pip-version-check --constraint $(LOCK)
@@ -37,7 +38,7 @@ COLCON := $(abspath $(BIN))/colcon --log-base log
 QUICK := $(addprefix tests/,docs controller_node excitation_node fjr_records fjr_sim_node/test_plant.py \
   fjr_sim_node/test_effects_of_drive_and_gear.py gap_diagnosis/test_evidence.py gap_diagnosis/test_record_loop.py)
 
-.PHONY: help demo test test-quick ws bench lint lock clean check-machine
+.PHONY: help demo test test-quick ws bench docs lint lock clean check-machine
 
 help: ## show the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 12
@@ -63,6 +64,10 @@ ws: $(INSTALLED) ## build the ROS packages in ros_ws with colcon, test what was 
 bench: $(BENCH_INSTALLED) ## measure the figures of benchmarks/ on this machine
 	@$(BIN)/python -m benchmarks
 
+docs: $(DOCS_INSTALLED) ## build the documentation site; a broken link or reference fails
+	@NO_MKDOCS_2_WARNING=1 PYTHONPATH=. $(BIN)/python -m mkdocs build --strict --quiet
+	echo build/site/index.html
+
 lint: $(INSTALLED) ## check style and types
 	@$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -71,9 +76,9 @@ lint: $(INSTALLED) ## check style and types
 lock: ## compile both lock files anew (needs uv)
 	@compile() { uv pip compile --quiet --universal --strip-extras --custom-compile-command 'make lock' "$$@"; }
 	echo 'setuptools>=77' | compile pyproject.toml - --python-version 3.10 \
-	  --extra report --extra dask --extra ros --extra dev --extra bench --output-file requirements.lock
+	  --extra report --extra dask --extra ros --extra dev --extra docs --extra bench --extra export --extra rivals --output-file requirements.lock
 	printf '%s\n' 'setuptools>=77' 'numpy<2' | compile pyproject.toml - --python-version 3.12 \
-	  --extra report --extra dask --extra dev --extra bench --output-file requirements-installed-ros.lock
+	  --extra report --extra dask --extra dev --extra docs --extra bench --extra export --extra rivals --output-file requirements-installed-ros.lock
 	! grep -nE '://|^--' requirements.lock requirements-installed-ros.lock
 
 clean: ## remove .venv and everything that tools left behind
@@ -108,4 +113,8 @@ $(INSTALLED): pyproject.toml $(LOCK) | check-machine
 
 $(BENCH_INSTALLED): $(INSTALLED)
 	@$(PIP_INSTALL) --no-build-isolation --editable '.[$(EXTRAS),bench]'
+	touch $@
+
+$(DOCS_INSTALLED): $(INSTALLED)
+	@$(PIP_INSTALL) --no-build-isolation --editable '.[$(EXTRAS),docs]'
 	touch $@

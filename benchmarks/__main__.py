@@ -13,6 +13,7 @@ SCRIPTS = (
     "stationarity",
     "bag_reading",
     "analysis",
+    "parametric_fit",
     "waiting",
     "ros_graph",
 )

@@ -13,7 +13,8 @@ distortion in `distortion`, the distance from models (paper eq. 14) and the best
     >>> len(load_result("rig/analysis/result.json").levels)
     2
 
-`to_frd` gives the BLA of a level to python-control.
+`fit` makes a parametric model of it: `fit_bla`, `write_fit`. `to_frd` gives the BLA of a level to
+python-control, `to_control` its model.
 """
 
 from typing import TYPE_CHECKING
@@ -23,10 +24,25 @@ from fjr_kit.public_names import deferred_names
 if TYPE_CHECKING:
     from .analysis import analyze
     from .compare.metrics import ReferenceModel
+    from .fit.fit_control import to_control
+    from .fit.fit_output import write_fit
+    from .fit.fit_types import Fit
+    from .fit.fitting import fit_bla
     from .output import write_result
     from .results.result import Result, load_result
     from .results.tables import to_frd
 else:
     __getattr__, __dir__ = deferred_names(__name__)
 
-__all__ = ["ReferenceModel", "Result", "analyze", "load_result", "to_frd", "write_result"]
+__all__ = [
+    "Fit",
+    "ReferenceModel",
+    "Result",
+    "analyze",
+    "fit_bla",
+    "load_result",
+    "to_control",
+    "to_frd",
+    "write_fit",
+    "write_result",
+]

@@ -13,6 +13,7 @@ from fjr_records.records import Record, RecordSet
 from fjr_records.units import FOLLOWING_LIMIT, following, unit_sentence
 
 from .bla.arbitrary import ArbitraryBla, arbitrary_bla, run_of
+from .bla.sensitivity import of_this_loop
 from .checks import reliable_lines
 from .compare.metrics import ReferenceModel, compare
 from .results.result import LevelResult, LineLevels, Result
@@ -180,7 +181,9 @@ def _result(
         float(np.sqrt(np.mean([np.mean((x - x.mean()) ** 2) for x in column])))
         for column in zip(*signals, strict=True)
     ]
-    bla = None if found is None else found.bla
+    bla = None
+    if found is not None:
+        bla = of_this_loop(found.bla, records[0].controller, sample_rate_hz)
     return LevelResult(
         level=level,
         amplitude_rad=nothing if found is None else found.levels.reference,

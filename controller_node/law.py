@@ -10,7 +10,7 @@ import numpy as np
 from fjr_kit.errors import InputError, shown
 
 from . import pd_filtered
-from .gains import SOURCE, with_gains
+from .gains import SOURCE, unknown_gains, with_gains
 from .structures import KINDS, known_fields, structure_of
 from .transfer_function import TransferFunction
 
@@ -46,3 +46,17 @@ def law_of(
 def as_transfer_function(law: Law) -> TransferFunction:
     """Return any law as a transfer function."""
     return law if isinstance(law, TransferFunction) else TransferFunction.of_pd(law)
+
+
+def acts_on_error(controller: Mapping[str, Any] | None, sample_rate_hz: float) -> bool | None:
+    """Return whether a described controller acts on r - y alone; None where that is not known.
+
+    Args:
+        controller: the `controller` entry of an experiment description.
+        sample_rate_hz: rate of the experiment.
+    """
+    try:
+        gains = dict.fromkeys(unknown_gains(controller), 1.0)
+        return as_transfer_function(law_of(controller, sample_rate_hz, gains)).one_degree
+    except InputError:
+        return None

@@ -18,12 +18,18 @@ from .analyze import analyze
 from .blind import blind
 from .bridge import bridge
 from .by_hand import estop, pause, play, reset, speed, status, step, stop
+from .check import check
+from .compare import compare
 from .demo import demo
 from .diagnose import diagnose
+from .example import example
+from .export import export
+from .fit import fit
 from .import_records import import_records
 from .output_pipe import outlive_readers
 from .paper import paper
 from .plan import plan
+from .record import record
 from .rehearse import rehearse
 from .replay import replay
 from .run import run
@@ -32,14 +38,13 @@ from .simulate import simulate
 
 Command = Callable[..., None]
 COMMANDS: tuple[Command, ...] = (
-    *(run, simulate, demo, rehearse, amplitude, shape, plan),
-    *(paper, diagnose, bridge, replay),
+    *(run, simulate, demo, example, rehearse, amplitude, shape, plan),
+    *(paper, diagnose, export, compare, bridge, replay, record, check),
 )
 BY_HAND: tuple[Command, ...] = (status, pause, play, step, reset, speed, stop, estop)
 
 app = typer.Typer(
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
 )
 
@@ -65,6 +70,7 @@ def options(
 
 
 app.command()(analyze)
+app.command()(fit)
 app.command("import")(import_records)
 for command in COMMANDS:
     app.command()(command)

@@ -52,7 +52,10 @@ def run(
     ] = Path("blind"),
     method: Annotated[
         list[str] | None,
-        typer.Option(help="fjr, refit, bic or sparse; default: fjr. Repeatable."),
+        typer.Option(
+            help="fjr, refit, bic, sparse, bam, pace or mujoco; default: fjr. Repeatable. The last "
+            "three need the extra rivals."
+        ),
     ] = None,
     dask: Dask = None,
     workers: Workers = None,

@@ -1,35 +1,164 @@
-"""`fjr plan`: the quickest experiment that reaches a target error."""
+"""`fjr plan`: what an experiment could show, and the quickest one that reaches a target error."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from .campaign_options import (
+    Levels,
+    Periods,
+    Realizations,
+    Rig,
+    Seed,
+    Set,
+    TransientPeriods,
+    described_campaign,
+)
 from .cli_errors import reports_errors
+from .described_runs import Controller, Duration, Record, described_runs, own_settings
+
+if TYPE_CHECKING:
+    from fjr_records.periodic import RecordedExperiment
+    from fjr_records.records import RecordSet
+
+ACCURACY = "How accurate a BLA (with --target-db)"
+SHOWN = "What it could show (with --nominal, or without FOLDER)"
 
 
 @reports_errors(kept="nothing was written")
 def plan(
     folder: Annotated[
-        Path, typer.Argument(help="Pilot bags: a few realizations at one or several amplitudes.")
-    ],
+        Path | None,
+        typer.Argument(
+            help="Pilot bags: a few realizations at one or several amplitudes. Without them, the "
+            "campaign that --rig, --level and the others describe, as for fjr simulate."
+        ),
+    ] = None,
     target_db: Annotated[
-        float,
-        typer.Option(min=1e-3, help="Error of |G| in dB that 95 % of the lines keep at 95 %."),
-    ],
-    band: Annotated[tuple[float, float], typer.Option(metavar="LOW HIGH", help="Band in Hz.")] = (
-        1.0,
-        50.0,
-    ),
-    rig_time: Annotated[float, typer.Option(min=1.0, help="Time of the rig in s.")] = 3600.0,
+        float | None,
+        typer.Option(
+            min=1e-3,
+            help="Propose the quickest experiment by which 95 % of the lines keep this error of "
+            "|G| in dB at 95 %; needs pilot bags.",
+            rich_help_panel=ACCURACY,
+        ),
+    ] = None,
+    band: Annotated[
+        tuple[float, float],
+        typer.Option(metavar="LOW HIGH", help="Band in Hz.", rich_help_panel=ACCURACY),
+    ] = (1.0, 50.0),
+    rig_time: Annotated[
+        float, typer.Option(min=1.0, help="Time of the rig in s.", rich_help_panel=ACCURACY)
+    ] = 3600.0,
     resolution: Annotated[
         float | None,
-        typer.Option(help="Coarsest line spacing in Hz allowed; default: that of the pilot."),
+        typer.Option(
+            help="Coarsest line spacing in Hz allowed; default: that of the pilot.",
+            rich_help_panel=ACCURACY,
+        ),
     ] = None,
+    nominal: Annotated[
+        str | None,
+        typer.Option(
+            metavar="paper|FILE",
+            help="Datasheet of the bare plant as for fjr diagnose: say which of its parameters, "
+            "and which effects beside them, the experiment could show. Default for a plan: --rig.",
+            rich_help_panel=SHOWN,
+        ),
+    ] = None,
+    effects: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME,NAME,...",
+            help="Look at these effects only; default: the catalogue.",
+            rich_help_panel=SHOWN,
+        ),
+    ] = None,
+    tolerance: Annotated[
+        float,
+        typer.Option(
+            min=0.001,
+            max=0.5,
+            help="How far a datasheet value may be off, relative.",
+            rich_help_panel=SHOWN,
+        ),
+    ] = 0.1,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FOLDER", help="Write plan.json there.", rich_help_panel=SHOWN),
+    ] = None,
+    rig: Rig = None,
+    level: Levels = None,
+    realizations: Realizations = None,
+    periods: Periods = None,
+    transient_periods: TransientPeriods = None,
+    seed: Seed = None,
+    settings: Set = None,
+    controller: Controller = None,
+    record: Record = None,
+    duration: Duration = None,
 ) -> None:
-    """Say which M, P, amplitude and grid reach a target error, and what they cost."""
+    """Say what an experiment could show before rig time is spent, or what it takes.
+
+    FOLDER --target-db X proposes M, P, amplitude and grid by the noise and distortion of pilot
+    bags. FOLDER --nominal FILE says how well a diagnosis of such bags would know the datasheet's
+    parameters, and how large each effect must be to be named. Without FOLDER it says so of a
+    campaign, or of records, that nobody has recorded yet.
+    """
+    from fjr_kit.errors import InputError
+
+    planned = {
+        "--rig": rig, "--level": level, "--realizations": realizations, "--periods": periods,
+        "--transient-periods": transient_periods, "--seed": seed, "--set": settings,
+        "--controller": controller, "--record": record, "--duration": duration,
+    }  # fmt: skip
+    given = [name for name, value in planned.items() if value is not None]
+    if folder is None and target_db is not None:
+        raise InputError("--target-db needs pilot bags, by which noise and distortion are known.")
+    if folder is not None and given:
+        raise InputError(f"{given[0]} describes a plan; leave it out, or leave {folder} out.")
+    if folder is not None and target_db is None and nominal is None:
+        raise InputError(
+            "Give --nominal for what the bags could show, --target-db for what a BLA takes, or "
+            "both."
+        )
+    if folder is not None and target_db is not None:
+        _propose(folder, target_db, band, rig_time, resolution)
+    if folder is not None and nominal is None:
+        return
+    asked = None if effects is None else [name.strip() for name in effects.split(",")]
+    if folder is not None:
+        _foresee_bags(folder, str(nominal), tolerance, asked, out)
+        return
+    own = own_settings(settings, record, duration, periods, transient_periods)
+    _foresee_plan(
+        dict(
+            rig=rig,
+            settings=[setting for setting in settings or [] if setting not in own],
+            amplitudes_rad=tuple(level) if level else None,
+            realizations=realizations,
+            periods=periods,
+            transient_periods=transient_periods,
+            seed=seed,
+        ),
+        (controller, record, duration, own),
+        nominal,
+        tolerance,
+        asked,
+        out,
+    )
+
+
+def _propose(
+    folder: Path,
+    target_db: float,
+    band: tuple[float, float],
+    rig_time: float,
+    resolution: float | None,
+) -> None:
     from fjr_bringup.design.planner import propose, read_pilots
 
     found = propose(read_pilots(folder), target_db, band, rig_time, resolution_hz=resolution)
@@ -50,3 +179,81 @@ def plan(
         f"--set excitation.base_frequency_hz={found.base_frequency_hz:g} "
         f"--set excitation.f_min_hz={found.base_frequency_hz:g}"
     )
+
+
+def _foresee_bags(
+    folder: Path, nominal: str, tolerance: float, effects: list[str] | None, out: Path | None
+) -> None:
+    from fjr_records.periodic import RecordedExperiment
+    from gap_diagnosis.any_record import read_any
+    from gap_diagnosis.model.nominal import read_nominal, refuse_wrong_units
+
+    values = read_nominal(nominal)
+    recorded = read_any(folder)
+    if isinstance(recorded, RecordedExperiment):
+        warning = refuse_wrong_units(recorded, values, nominal)
+        if warning:
+            typer.echo(f"Warning: {warning}", err=True)
+    _foresee(recorded, values, None, tolerance, effects, out)
+
+
+def _foresee_plan(
+    options: dict[str, Any],
+    described: tuple[Path | None, str | None, float | None, list[str]],
+    nominal: str | None,
+    tolerance: float,
+    effects: list[str] | None,
+    out: Path | None,
+) -> None:
+    from fjr_bringup.campaign.plan import Campaign
+    from fjr_bringup.design.planned import planned_record
+    from fjr_sim_node.plant import PLANT
+    from gap_diagnosis.model.nominal import read_nominal, refuse_effects
+
+    campaign = described_campaign(options.pop("rig"), options.pop("settings"), None, **options)
+    if nominal is not None:
+        rig = {**campaign.values["simulator"], **read_nominal(nominal)}
+        campaign = Campaign({**campaign.values, "simulator": rig})
+    refuse_effects(campaign.values["simulator"], "/rig/simulator")
+    controller, record, *_ = described
+    runs, reference = None, None
+    if controller is not None or record is not None:
+        runs, reference = described_runs(campaign, *described)
+    values = {name: float(campaign.values["simulator"][name]) for name in PLANT.names}
+    _foresee(
+        planned_record(campaign, runs, reference),
+        values,
+        campaign.values["excitation"]["realizations"],
+        tolerance,
+        effects,
+        out,
+    )
+
+
+def _foresee(
+    recorded: RecordedExperiment | RecordSet,
+    values: dict[str, float],
+    realizations: int | None,
+    tolerance: float,
+    effects: list[str] | None,
+    out: Path | None,
+) -> None:
+    from rich.console import Console
+
+    from fjr_kit.atomic import result_folder
+    from fjr_kit.progress import ProgressLine
+    from gap_diagnosis.foresight.foresee import foresee
+
+    from .plan_summary import print_foresight
+
+    with ProgressLine(transient=True) as progress:
+        found = foresee(
+            recorded, values, realizations=realizations, tolerance=tolerance, effects=effects,
+            progress=progress.count,
+        )  # fmt: skip
+    if out is not None:
+        with result_folder(out, ("plan.json",)) as place:
+            (place / "plan.json").write_text(found.to_json(), encoding="utf-8")
+    print_foresight(found, Console())
+    if out is not None:
+        typer.echo(out / "plan.json")

@@ -11,8 +11,9 @@ MapSignals = Annotated[
     typer.Option(
         "--map",
         metavar="SIGNAL=TOPIC:FIELD[JOINT]",
-        help="Where reference, torque or position stands in foreign bags, such as "
-        "position=/joint_states:position[elbow]; reference=none if there is none. Repeatable.",
+        help="Where reference, torque, position or link stands in foreign bags, such as "
+        "position=/joint_states:position\\[elbow]; reference=none or link=none leaves it out. "
+        "Repeatable.",
     ),
 ]
 SamplesPerPeriod = Annotated[

@@ -5,13 +5,16 @@ from __future__ import annotations
 import math
 from enum import Enum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from fjr_kit.errors import InputError, needing_ros
 
 from .cli_errors import reports_errors
+
+if TYPE_CHECKING:
+    from fjr_bringup.replay.publishing import Publishing
 
 _PUBLISH, _INTO = "Publishing", "Into the graph"
 
@@ -98,6 +101,14 @@ def replay(
             "--loop", help="Begin again at the end, until Ctrl-C.", rich_help_panel=_PUBLISH
         ),
     ] = False,
+    follow_clock: Annotated[
+        bool,
+        typer.Option(
+            "--follow-clock",
+            help="Let another program's /clock keep the time, and publish none.",
+            rich_help_panel=_PUBLISH,
+        ),
+    ] = False,
     wait_for: Annotated[
         list[str] | None,
         typer.Option(
@@ -108,16 +119,28 @@ def replay(
     ] = None,
 ) -> None:
     """Publish a bag with its clock, or play it into controller and simulated plant."""
-    publishing = (rate, topics, start_offset_s, loop or None, wait_for)
+    publishing = (rate, topics, start_offset_s, loop or None, follow_clock or None, wait_for)
     if into is None:
         if any(option is not None for option in (rig, settings, out)):
             raise InputError("--rig, --set and --out need --into; without it nothing is simulated.")
-        _publish(bag, rate, topics or [], start_offset_s or 0.0, loop, wait_for or [])
+        from fjr_bringup.replay.publishing import Publishing
+
+        if follow_clock and rate == "max":
+            raise InputError("--rate max does not go with --follow-clock: the clock has its speed.")
+        how = Publishing(
+            _factor("1" if rate is None else rate),
+            tuple(topics or ()),
+            start_offset_s or 0.0,
+            loop,
+            tuple(wait_for or ()),
+            follow_clock,
+        )
+        _publish(bag, how)
         return
     if any(option is not None for option in publishing):
         raise InputError(
-            "--rate, --topic, --start-offset, --loop and --wait-for are for publishing; --into "
-            "plays the whole bag in lockstep."
+            "--rate, --topic, --start-offset, --loop, --follow-clock and --wait-for are for "
+            "publishing; --into plays the whole bag in lockstep."
         )
     from fjr_bringup.replay.lockstep_plan import plan_replay
 
@@ -132,22 +155,11 @@ def replay(
     typer.echo(path)
 
 
-def _publish(
-    bag: Path,
-    rate: str | None,
-    topics: list[str],
-    start_offset_s: float,
-    loop: bool,
-    wait_for: list[str],
-) -> None:
+def _publish(bag: Path, publishing: Publishing) -> None:
     from fjr_bringup.replay.bag import the_bag
-    from fjr_bringup.replay.publishing import Publishing
 
     from .replay_summary import print_published
 
-    publishing = Publishing(
-        _factor("1" if rate is None else rate), tuple(topics), start_offset_s, loop, tuple(wait_for)
-    )
     with needing_ros():
         from fjr_bringup.replay.player import publish_bag
     publish_bag(the_bag(bag), publishing, print_published)

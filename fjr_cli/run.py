@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from fjr_kit.errors import needing_ros
 
 from .campaign_options import (
+    DryRun,
     Levels,
     Out,
     Periods,
@@ -19,11 +21,30 @@ from .campaign_options import (
     Set,
     TransientPeriods,
     described_campaign,
+    print_estimate,
 )
 from .cli_errors import reports_errors
 
+if TYPE_CHECKING:
+    from fjr_bringup.campaign.plan import Campaign
+    from fjr_bringup.campaign.progress import CampaignProgress
+
 Composed = Annotated[
     bool, typer.Option("--composed", help="All nodes in one process instead of one each: faster.")
+]
+
+
+Live = Annotated[
+    bool, typer.Option("--live", help="Draw the BLA after each realization, as it is until then.")
+]
+UntilDb = Annotated[
+    float | None,
+    typer.Option(
+        min=1e-6,
+        metavar="DB",
+        help="Record no more of a level once the standard deviation of its BLA, the median of the "
+        "lines, is at most this; after four realizations at the least.",
+    ),
 ]
 
 
@@ -38,11 +59,11 @@ def run(
     seed: Seed = None,
     settings: Set = None,
     composed: Composed = False,
+    live: Live = False,
+    until_db: UntilDb = None,
+    dry_run: DryRun = False,
 ) -> None:
     """Run a campaign through the ROS graph and record one bag per realization."""
-    with needing_ros(", or use fjr simulate"):
-        from fjr_bringup.graph.graph_run import run_campaign
-
     from .campaign_folder import fill_folder, new_folder
 
     folder = out or new_folder()
@@ -56,5 +77,20 @@ def run(
         transient_periods=transient_periods,
         seed=seed,
     )
-    fill_folder("run", partial(run_campaign, composed=composed), campaign, folder)
+    if dry_run:
+        print_estimate(campaign, out, on_graph=True)
+        return
+    with needing_ros(", or use fjr simulate"):
+        from fjr_bringup.graph.graph_run import run_campaign
+    if not live and until_db is None:
+        fill_folder("run", partial(run_campaign, composed=composed), campaign, folder)
+        typer.echo(folder)
+        return
+    from fjr_bringup.campaign.live import LiveBla
+
+    def watched(campaign: Campaign, folder: Path, *, progress: CampaignProgress) -> list[Path]:
+        bla = LiveBla(campaign, progress.say, until_db, draw=live)
+        return run_campaign(campaign, folder, composed=composed, live=bla, progress=progress)
+
+    fill_folder("run", watched, campaign, folder)
     typer.echo(folder)

@@ -9,22 +9,30 @@ from pathlib import Path
 
 from pydantic import BaseModel
 
+from bla_analyzer.fit.fit_types import Fit
 from bla_analyzer.results.result import Result
 from fjr_bringup.rehearsal.result import Rehearsal
 from fjr_bringup.replay.comparison import ReplayResult
+from fjr_compare.result import Comparison
+from fjr_export.result import Export
 from fjr_interface.experiment import Experiment
 from fjr_validation.blind.check import Manifest, Unsealed
 from fjr_validation.blind.score import Scores
 from fjr_validation.paper.reproduction import PaperResults
+from gap_diagnosis.foresight.foreseen import Foresight
 from gap_diagnosis.outcome.diagnosis import Diagnosis
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 DOCUMENTS: dict[str, type[BaseModel]] = {
     "blind": Manifest,
+    "compare": Comparison,
     "diagnosis": Diagnosis,
     "experiment": Experiment,
+    "fit": Fit,
+    "export": Export,
     "paper_results": PaperResults,
     "rehearsal": Rehearsal,
+    "plan": Foresight,
     "replay": ReplayResult,
     "result": Result,
     "scores": Scores,

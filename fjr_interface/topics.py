@@ -69,12 +69,19 @@ beyond it, so a slow recorder slows the lockstep instead of losing samples."""
 
 
 _CLOCK = struct.Struct("<4siI")
+_CLOCK_SAYS = struct.Struct("<4xiI")
 _CDR = b"\x00\x01\x00\x00"
 
 
 def clock_message(stamp_ns: int) -> bytes:
     """Return the CDR bytes of a rosgraph_msgs/Clock that says a stamp (ns)."""
     return _CLOCK.pack(_CDR, *divmod(stamp_ns, 1_000_000_000))
+
+
+def clock_ns(message: bytes) -> int:
+    """Return the stamp (ns) that the CDR bytes of a rosgraph_msgs/Clock say."""
+    seconds, nanoseconds = _CLOCK_SAYS.unpack_from(message)
+    return int(seconds) * 1_000_000_000 + int(nanoseconds)
 
 
 def stamp_ns(sample: int, sample_rate_hz: float) -> int:

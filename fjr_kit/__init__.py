@@ -13,5 +13,6 @@ where the code is what they describe, into a document (`document_tables`).
 
 `compiled` caches the numerical kernels by the state of their sources, `imports` finds the sources
 that a kept result rests on, `installed` where packages and extras are. `public_names` imports what
-a package exports when it is asked for. Nothing here imports another package of the product.
+a package exports when it is asked for. `showing` says what a refit of parameters leaves of a
+change, and how large a change must be to show. Nothing here imports another package of the product.
 """

@@ -14,6 +14,8 @@ PRODUCT = (
     "excitation_node",
     "fjr_bringup",
     "fjr_cli",
+    "fjr_compare",
+    "fjr_export",
     "fjr_interface",
     "fjr_kit",
     "fjr_records",

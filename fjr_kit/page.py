@@ -24,11 +24,12 @@ MOST_CARDS = 20
 
 
 class Column(NamedTuple):
-    """Head of a table's column; a column with a format holds numbers."""
+    """Head of a table's column; a column with a format holds numbers, a note explains its name."""
 
     name: str
     unit: str = ""
     form: str = ""
+    note: str = ""
 
     @property
     def label(self) -> str:

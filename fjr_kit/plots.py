@@ -7,6 +7,7 @@ light, dark and print share one description.
 from __future__ import annotations
 
 import html
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -134,7 +135,65 @@ def extremes(t: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return t[index], y[index]
 
 
-def linked(traces: list[Trace], titles: list[str], heights: list[float], f: np.ndarray) -> Plot:
-    """Return a plot whose zoom along frequency `f` the others follow; last traces lie on top."""
-    made = frequency_layout(titles, heights, f) | {"legend": {"traceorder": "reversed"}}
+def linked(
+    traces: list[Trace],
+    titles: list[str],
+    heights: list[float],
+    f: np.ndarray,
+    on_top: str = "last",
+) -> Plot:
+    """Return a plot over frequency `f` (Hz), whose zoom and axis the others of the page follow.
+
+    The legend names the trace that lies on top first; `on_top` "first" keeps their order.
+    """
+    made = frequency_layout(titles, heights, f)
+    if on_top == "last":
+        made["legend"] = {"traceorder": "reversed"}
     return {"data": traces, "layout": made, "linked": True}
+
+
+def area(
+    x: ArrayLike, low: ArrayLike, high: ArrayLike, name: str, color: str, **options: Any
+) -> Trace:
+    """Return the area between two curves over x; what is not finite cuts it."""
+    at, bottom, top = (np.asarray(values, float) for values in (x, low, high))
+    known = np.isfinite(bottom) & np.isfinite(top)
+    ends = np.flatnonzero(np.diff(np.concatenate([[0], known.astype(int), [0]])))
+    parts = [slice(*pair) for pair in ends.reshape(-1, 2).tolist()]
+    outlines = [
+        (np.concatenate([at[p], at[p][::-1]]), np.concatenate([bottom[p], top[p][::-1]]))
+        for p in parts
+    ]
+    return filled(outlines, name, color, **options)
+
+
+def filled(
+    outlines: Sequence[tuple[np.ndarray, np.ndarray]], name: str, color: str, **options: Any
+) -> Trace:
+    """Return filled polygons, (x, y) of the corners of each."""
+    gap = [np.nan]
+    x, y = (
+        np.concatenate([part for outline in outlines for part in (outline[i], gap)] or [gap])
+        for i in (0, 1)
+    )
+    made = trace(x, y, name, color, dash="solid", width=0.0, **options)
+    del made["hovertemplate"]
+    return made | {"fill": "toself", "fillcolor": color, "opacity": 0.3, "hoverinfo": "skip"}
+
+
+def plane(traces: list[Trace], x: str, y: str, window: tuple[float, ...] | None = None) -> Plot:
+    """Return a plot of the complex plane, both axes of one scale.
+
+    Of a trace with frequencies as `customdata` the page shows those in the band that is zoomed.
+
+    Args:
+        traces: last ones lie on top.
+        x: title of the axis of the real part.
+        y: title of the axis of the imaginary part.
+        window: what is seen at first: x from, x to, y from, y to.
+    """
+    made = layout(x, y) | {"legend": {"traceorder": "reversed"}}
+    made["yaxis"] |= {"scaleanchor": "x"}
+    if window is not None:
+        made["xaxis"]["range"], made["yaxis"]["range"] = list(window[:2]), list(window[2:])
+    return {"data": traces, "layout": made, "plane": True}

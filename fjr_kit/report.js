@@ -36,10 +36,51 @@
     modeBarButtons: [["zoom2d", "pan2d", "resetScale2d", "toImage"]],
     toImageButtonOptions: {format: "svg", filename: "bla"}};
 
+  const NARROW = {width: 450, height: 1.2}; // below this width (px) legends need lines of their own
+  const PRINTED = {width: 640, height: 0.8}; // px, which A4 and letter hold within their margins; of the height
   const places = [...document.querySelectorAll(".plot")];
   const plotFor = (place) => page.overview[place.id] ?? page.levels[level][place.id];
 
-  const views = new Map(); // place -> the reader's range along x, as plotly takes it
+  const views = new Map(); // place -> the reader's range along x, as plotly takes it; plots without frequency
+  let band = null; // the reader's band in Hz, of all plots over frequency; null for the whole
+  let unit = "Hz";
+  let scale = null; // "log" or "linear"; null for what each plot is
+  let printing = false;
+
+  const factor = () => (unit === "Hz" ? 1 : 2 * Math.PI);
+  const isLog = (axis) => (scale === null ? axis.type === "log" : scale === "log");
+  const inUnit = (text) => text?.replaceAll(" Hz<", ` ${unit}<`);
+  const scaled = (values) => values.map((v) => (v === null ? null : v * factor()));
+
+  // The axis of a plot over frequency, which is made in Hz, by the switches and the reader's band.
+  const frequencyAxis = ({type, dtick, tickformat, range, ...axis}) => {
+    const log = isLog({type});
+    const shown = band ?? (log && range ? range.map((v) => 10 ** v) : null);
+    const change = {title: {text: unit === "Hz" ? "frequency (Hz)" : "angular frequency (rad/s)"}};
+    if (log) {
+      Object.assign(change, {type: "log", tickformat: "~g"});
+      if (!shown || shown[1] > 20 * shown[0]) change.dtick = 1;
+    }
+    if (shown) change.range = scaled(shown).map((v) => (log ? Math.log10(v) : v));
+    return {...axis, ...change};
+  };
+
+  // A trace in the complex plane, of the band only; a corner of a disc is a point with its frequency.
+  const inBand = (trace) => {
+    if (!trace.customdata) return trace;
+    const kept = trace.customdata.map((f, i) => i).filter((i) =>
+      trace.customdata[i] === null || !band || (trace.customdata[i] >= band[0] && trace.customdata[i] <= band[1]));
+    const pick = (values) => kept.map((i) => values[i]);
+    return {...trace, x: pick(trace.x), y: pick(trace.y), customdata: scaled(pick(trace.customdata)),
+      hovertemplate: inUnit(trace.hovertemplate)};
+  };
+
+  const inView = (plot) => {
+    if (plot.plane) return {...plot, data: plot.data.map(inBand)};
+    if (!plot.linked) return plot;
+    const data = plot.data.map((trace) => ({...trace, x: scaled(trace.x), hovertemplate: inUnit(trace.hovertemplate)}));
+    return {...plot, data, layout: {...plot.layout, xaxis: frequencyAxis(plot.layout.xaxis)}};
+  };
 
   // What a change of the view says about x: a new range, null for the whole, undefined for nothing.
   const rangeIn = (change) => {
@@ -48,28 +89,48 @@
     return low === undefined ? undefined : [low, high];
   };
 
-  // A zoom along frequency in one plot of the level shows the same band in the others.
+  // A zoom along frequency in one plot shows the same band in all others of the page.
   let linking = false;
   const link = (place) => place.on("plotly_relayout", (change) => {
     const range = rangeIn(change);
-    if (range === undefined) return;
-    if (range) views.set(place, range);
-    else views.delete(place);
-    if (linking || !plotFor(place)?.linked) return;
-    linking = true;
-    const others = places.filter((other) => other !== place && plotFor(other)?.linked);
-    const view = () => (range ? {"xaxis.range": range.slice()} : {"xaxis.autorange": true});
-    Promise.all(others.map((other) => Plotly.relayout(other, view()))).finally(() => { linking = false; });
+    if (range === undefined || linking) return;
+    const plot = plotFor(place);
+    if (!plot?.linked) {
+      if (range) views.set(place, range);
+      else views.delete(place);
+      return;
+    }
+    const hertz = (v) => (isLog(plot.layout.xaxis) ? 10 ** v : v) / factor();
+    show(range && range.map(hertz));
   });
+
+  const show = (wanted) => {
+    band = wanted;
+    linking = true;
+    const followers = places.filter((place) => plotFor(place)?.linked);
+    places.filter((place) => plotFor(place)?.plane).forEach((place) => {
+      views.delete(place);
+      draw(place);
+    });
+    Promise.all(followers.map((place) => {
+      const {range, dtick} = frequencyAxis(plotFor(place).layout.xaxis);
+      const axis = range ? {"xaxis.range": range} : {"xaxis.autorange": true};
+      return Plotly.relayout(place, {...axis, "xaxis.dtick": dtick ?? null});
+    })).finally(() => { linking = false; });
+  };
 
   const draw = (place) => {
     const plot = plotFor(place);
     place.closest("figure").hidden = !plot;
     if (!plot) return;
-    const layout = layoutOf(plot, Number(place.dataset.height));
-    if (views.has(place)) layout.xaxis.range = views.get(place).slice();
+    const {data, layout: given, linked} = inView(plot);
+    const higher = place.clientWidth < NARROW.width ? NARROW.height : 1;
+    const height = Number(place.dataset.height) * (printing ? PRINTED.height : higher);
+    const layout = layoutOf({layout: given}, height);
+    if (printing) layout.width = PRINTED.width;
+    if (views.has(place) && !linked) layout.xaxis.range = views.get(place).slice();
     const isNew = !place.on;
-    Plotly.react(place, themed(plot.data, ""), layout, config);
+    Plotly.react(place, themed(data, ""), layout, config);
     if (isNew) link(place);
   };
   const drawAll = () => places.forEach(draw);
@@ -88,11 +149,47 @@
 
   document.querySelectorAll("button[data-level]").forEach((button) =>
     button.addEventListener("click", () => select(Number(button.dataset.level))));
+
+  // Switches of the frequency axis; the plots' own scale is marked until one is chosen.
+  const press = () => {
+    const plots = places.map(plotFor).filter((plot) => plot?.linked);
+    document.querySelectorAll(".switches button").forEach((button) => {
+      const {unit: own, scale: kind} = button.dataset;
+      if (own) button.setAttribute("aria-pressed", String(own === unit));
+      if (kind) {
+        button.setAttribute("aria-pressed", String(plots.some((plot) => isLog(plot.layout.xaxis) === (kind === "log"))));
+      }
+    });
+  };
+  document.querySelectorAll(".switches button").forEach((button) => button.addEventListener("click", () => {
+    if ("whole" in button.dataset) {
+      show(null);
+      return;
+    }
+    unit = button.dataset.unit ?? unit;
+    scale = button.dataset.scale ?? scale;
+    drawAll();
+    press();
+  }));
+
   const wanted = Number(/^#level=(\d+)$/.exec(location.hash)?.[1] ?? 0);
   select(wanted < page.levels.length ? wanted : 0);
-  document.getElementById("all-bla")?.on?.("plotly_click", (event) => select(event.points[0].data.meta));
+  press();
+  document.querySelectorAll("[id^=all-]").forEach((place) =>
+    place.on?.("plotly_click", (event) => {
+      const {meta} = event.points[0].data;
+      if (meta !== undefined) select(meta);
+    }));
 
+  const print = (on) => {
+    if (printing === on) return;
+    printing = on;
+    root.classList.toggle("light", on);
+    drawAll();
+    if (!on) places.filter((place) => place.on).forEach((place) => Plotly.Plots.resize(place));
+  };
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => drawAll());
-  addEventListener("beforeprint", () => { root.classList.add("light"); drawAll(); });
-  addEventListener("afterprint", () => { root.classList.remove("light"); drawAll(); });
+  matchMedia("print").addEventListener("change", (event) => print(event.matches));
+  addEventListener("beforeprint", () => print(true));
+  addEventListener("afterprint", () => print(false));
 })();

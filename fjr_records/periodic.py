@@ -15,7 +15,7 @@ from fjr_kit.errors import InputError
 
 from .experiment_bag import ExperimentBag, Override
 from .experiment_folder import open_experiment
-from .records import reference_optional
+from .records import Record, RecordSet, reference_optional
 from .spectra import line_spectrum
 
 
@@ -108,6 +108,21 @@ class RecordedExperiment:
     def has_link(self) -> bool:
         """Whether all realizations have a second encoder."""
         return all(realization.link is not None for realization in self.realizations)
+
+    def as_records(self) -> RecordSet:
+        """Return the same runs whole, transient and periods after each other."""
+        records = tuple(
+            Record(
+                r.name,
+                r.experiment,
+                None if r.reference is None else r.reference.ravel(),
+                r.torque.ravel(),
+                r.position.ravel(),
+                None if r.link is None else r.link.ravel(),
+            )
+            for r in self.realizations
+        )
+        return RecordSet(self.source, self.experiment.sample_rate_hz, records, self.notes)
 
     def kinds(self) -> np.ndarray:
         """Return the kind of each line, str (lines,): excited, odd, even or dc.

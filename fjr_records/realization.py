@@ -92,8 +92,8 @@ def read_realization(
         name: name of the bag.
         level: index of the level.
         realization: index within the level.
-        periods: r, u, y of one period after the other, from the start of the bag; a shorter one at
-            the end is ignored.
+        periods: r, u, y, perhaps q, of one period after the other, from the start of the bag; a
+            shorter one at the end is ignored.
         grid: grid of the experiment.
         keep_signals: whether to keep the last period.
 
@@ -144,8 +144,8 @@ class _Extremes:
         self.peak = np.zeros(3)
 
     def add(self, period: Samples) -> None:
-        self.squares += [np.mean(signal**2) for signal in period]
-        self.peak = np.maximum(self.peak, [np.abs(signal).max() for signal in period])
+        self.squares += [np.mean(signal**2) for signal in period[:3]]
+        self.peak = np.maximum(self.peak, [np.abs(signal).max() for signal in period[:3]])
 
 
 def _check_repeats(name: str, first: np.ndarray, period: np.ndarray) -> None:
@@ -266,13 +266,17 @@ def _tenths(difference: np.ndarray) -> np.ndarray:
 
 
 def _time_signals(period: Samples, grid: Grid) -> TimeSignals:
-    r, u, y = (signal.copy() for signal in period)
+    r, u, y = (signal.copy() for signal in period[:3])
     time_s = np.arange(r.size) / grid.sample_rate_hz
     return TimeSignals(time_s=time_s, reference_rad=r, torque_nm=u, position_rad=y)
 
 
 def signal_blocks(reader: BagReader, samples: int) -> Iterator[Samples]:
-    """Yield (r, u, y) of a bag in blocks; u stands for r where no reference is read."""
+    """Yield (r, u, y), or (r, u, y, q) of a bag that has a link position, in blocks.
+
+    u stands for r where no reference is read.
+    """
     for block in reader.blocks(samples):
         reference = block.torque if block.reference is None else block.reference
-        yield reference, block.torque, block.position
+        link = () if block.link is None else (block.link,)
+        yield reference, block.torque, block.position, *link

@@ -15,6 +15,8 @@ from typing import Literal
 
 import numpy as np
 
+from fjr_interface.experiment import Experiment
+
 from .records import Record, RecordSet
 
 NoiseSource = Literal["repeats", "standstill", "residual", "none"]
@@ -46,7 +48,7 @@ class RecordNoise:
 
 def record_noise(records: RecordSet) -> RecordNoise:
     """Return the noise of the position, by the best evidence that the records hold."""
-    repeated = _of_repeats(records)
+    repeated = _of_differences([*_between_repeats(records), *_between_periods(records)])
     if repeated is not None:
         return RecordNoise("repeats", repeated)
     still = [s for s in map(_standstill, records.records) if s is not None]
@@ -58,17 +60,37 @@ def record_noise(records: RecordSet) -> RecordNoise:
     return RecordNoise("none", float("nan"))
 
 
-def _of_repeats(records: RecordSet) -> float | None:
-    """Return the white part of what differs between repeats; None if there are none."""
+def _between_repeats(records: RecordSet) -> list[np.ndarray]:
+    """Return what differs between records that repeat each other."""
+    return [
+        records.records[one].position - records.records[other].position
+        for group in records.repeats
+        for one, other in pairwise(group)
+    ]
+
+
+def _between_periods(records: RecordSet) -> list[np.ndarray]:
+    """Return what differs between the periods after the transient."""
+    found = []
+    for record in records.records:
+        description = record.description
+        if isinstance(description, Experiment):
+            length = description.samples_per_period
+            whole = record.position[: record.samples // length * length]
+            periods = whole.reshape(-1, length)
+            found += list(np.diff(periods[description.transient_periods :], axis=0))
+    return found
+
+
+def _of_differences(differences: Sequence[np.ndarray]) -> float | None:
+    """Return the white part of differences between repeats; None where none shows it."""
     floors = []
-    for group in records.repeats:
-        for one, other in pairwise(group):
-            difference = records.records[one].position - records.records[other].position
-            floor = _floor(difference)
-            if floor is None:
-                floor = _steps(difference)
-            if floor is not None:
-                floors.append(floor / np.sqrt(2.0))
+    for difference in differences:
+        floor = _floor(difference)
+        if floor is None:
+            floor = _steps(difference)
+        if floor is not None:
+            floors.append(floor / np.sqrt(2.0))
     return float(np.median(floors)) if floors else None
 
 

@@ -6,7 +6,7 @@ does not repeat through `record_investigation`. Both lead through the stages: `g
 fit for a diagnosis?), `where` (residual maps, what a remainder looks like), `which` (fits of
 effects, their attribution), `how_far` (the gap held out from the fits), `next_experiment`,
 `report`. All simulate through `model`. `judgement` and `record_judgement` draw the verdict from
-what the stages found.
+what the stages found. `foresight` says beforehand what they could find.
 
     >>> from gap_diagnosis import diagnose, read_nominal
     >>> diagnosis = diagnose("rig", read_nominal("paper"))
@@ -22,6 +22,8 @@ from fjr_kit.public_names import deferred_names
 
 if TYPE_CHECKING:
     from .any_record import diagnose
+    from .foresight.foresee import foresee
+    from .foresight.foreseen import Foresight
     from .investigation import Investigation, investigate
     from .model.nominal import read_nominal
     from .outcome.diagnosis import Diagnosis
@@ -32,9 +34,11 @@ else:
 
 __all__ = [
     "Diagnosis",
+    "Foresight",
     "Investigation",
     "RecordInvestigation",
     "diagnose",
+    "foresee",
     "investigate",
     "investigate_records",
     "read_nominal",

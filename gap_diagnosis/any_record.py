@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -21,6 +22,13 @@ from .record_investigation import RecordInvestigation, investigate_records
 from .which.search_space import TOLERANCE
 
 Progress = Callable[[str], None]
+
+STEADY_SHARE = 0.5
+"""Of the budget for explanations of steady periods that leave noise alone."""
+BESIDE = (
+    "No explanation of the steady periods leaves noise alone, so the whole runs were searched for "
+    "causes beside a remainder."
+)
 
 
 def diagnose(
@@ -108,13 +116,43 @@ def investigate_any(
     budget_s: float = math.inf,
     progress: Progress = lambda _: None,
 ) -> Investigation | RecordInvestigation:
-    """Diagnose what `read_any` has read and keep all the evidence; arguments as of `diagnose`."""
-    if isinstance(recorded, RecordSet):
-        return investigate_records(
-            recorded, nominal, tolerance=tolerance, effects=effects, budget_s=budget_s,
+    """Diagnose what `read_any` has read and keep all the evidence; arguments as of `diagnose`.
+
+    Steady periods are compared period by period, which shows the least effects. Where no
+    explanation leaves noise alone, their runs are searched as records for causes beside a
+    remainder.
+    """
+    begun = time.monotonic()
+    if isinstance(recorded, RecordedExperiment):
+        steady = investigate(
+            recorded, nominal, tolerance=tolerance, effects=effects,
+            budget_s=STEADY_SHARE * budget_s, progress=progress,
+        )  # fmt: skip
+        if steady.diagnosis.verdict != "unexplained":
+            return steady
+        left = max(budget_s - (time.monotonic() - begun), 0.0)
+        whole = investigate_records(
+            recorded.as_records(), nominal, tolerance=tolerance, effects=effects, budget_s=left,
             progress=progress,
         )  # fmt: skip
-    return investigate(
+        return _beside(whole, steady)
+    return investigate_records(
         recorded, nominal, tolerance=tolerance, effects=effects, budget_s=budget_s,
         progress=progress,
     )  # fmt: skip
+
+
+def _beside(whole: RecordInvestigation, steady: Investigation) -> RecordInvestigation:
+    """Return what was found beside a remainder, with what only steady periods tell."""
+    known = steady.diagnosis
+    told = whole.diagnosis.model_copy(
+        update={
+            "bags": known.bags or whole.diagnosis.bags,
+            "notes": [BESIDE, *_once(known.notes, whole.diagnosis.notes)],
+        }
+    )
+    return replace(whole, diagnosis=told)
+
+
+def _once(*notes: Sequence[str]) -> list[str]:
+    return list(dict.fromkeys(note for some in notes for note in some))

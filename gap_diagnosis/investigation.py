@@ -136,15 +136,27 @@ def investigate(
 
 
 def _split(recorded: RecordedExperiment) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Return `split` of the realizations."""
+    runs = recorded.realizations
+    return split([r.level for r in runs], [float(np.abs(r.torque).max()) for r in runs])
+
+
+def split(
+    levels: Sequence[int], greatest_torques: Sequence[float]
+) -> tuple[tuple[int, ...], tuple[int, ...]]:
     """Return training and held-out realizations: in turn at each level; all, if a level has one.
 
     At each level the one with the greatest torque is for training, so that a limit that it reaches
     is known to the fit before others are predicted.
+
+    Args:
+        levels: level of each realization.
+        greatest_torques: greatest |u| of each.
     """
     train, held = [], []
-    for level in recorded.levels:
-        members = [i for i, r in enumerate(recorded.realizations) if r.level == level]
-        members.sort(key=lambda i: -float(np.abs(recorded.realizations[i].torque).max()))
+    for level in sorted(set(levels)):
+        members = [i for i, mine in enumerate(levels) if mine == level]
+        members.sort(key=lambda i: -greatest_torques[i])
         train += members[0::2]
         held += members[1::2]
     return tuple(sorted(train)), tuple(sorted(held or train))

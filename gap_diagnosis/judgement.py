@@ -19,7 +19,7 @@ from .outcome.verdict_words import ROUNDING
 from .where.residual_map import ResidualMap
 from .which.attribution import Attribution
 from .which.confidence import confidence
-from .which.estimates import estimates
+from .which.estimates import estimates, with_scatter
 from .which.fits import Fit, Fitter
 
 NO_GAP = 2.0
@@ -71,7 +71,7 @@ def judge(
     )  # fmt: skip
     if rounded:
         said.append(_rounding(recorded, held, best, signals, misfits, figures.position.refit))
-    closed = figures.position.closed
+    closed, bags = figures.position.closed, gates.gates[-1].bags
     return _sure(
         Diagnosis(
             verdict=verdict,
@@ -83,10 +83,10 @@ def judge(
             gap=gaps,
             gap_closed=None if closed is None else closed.value,
             gap_figures=figures,
-            bags=gates.gates[-1].bags,
+            bags=bags,
             where=maps["refit" if misfits["refit"] > NO_GAP else "nominal"].places(),
             ranking=[_candidate(fit, size, refit, groups) for fit in attribution.candidates],
-            parameters=estimates(shown, groups),
+            parameters=with_scatter(estimates(shown, groups), bags, len(fitter.train.which)),
             next_experiment=_next(recorded, noise_std, attribution, verdict),
             notes=said,
         )

@@ -8,7 +8,7 @@ import numpy as np
 
 from .gates.gate_checks import GateReport
 from .outcome.diagnosis import Verdict
-from .outcome.verdict_words import ROUNDING
+from .outcome.verdict_words import OUT_OF_TIME, ROUNDING
 from .which.attribution import Attribution
 from .which.confidence import UNTESTED
 from .which.fits import Fit
@@ -20,7 +20,6 @@ NOT_HELD_OUT = (
     f"{UNTESTED:.0%}; record two or more realizations of each level."
 )
 _AT_LIMIT = 0.01  # of the way from the datasheet to the bound
-OUT_OF_TIME = "The time budget ended the search before all effects were tried."
 
 
 def notes(
@@ -80,7 +79,7 @@ def unexplained(attribution: Attribution, held_size: int) -> str:
     sentence = f"The refit leaves a misfit of {left(refit)} per degree of freedom"
     if best is not None:
         sentence += f", the best explanation, {' + '.join(best.effects)}, one of {left(best)}"
-    return f"{sentence}; none of the catalogue's effects accounts for the data."
+    return f"{sentence}; no effect of the catalogue accounts for all of it."
 
 
 def _beyond(fit: Fit, nominal: Mapping[str, float], tolerance: float) -> list[str]:

@@ -11,11 +11,13 @@ from fjr_kit.errors import InputError
 from fjr_records.records import Record, RecordSet
 from fjr_sim_node import effects as fx
 
+from .gates.bags_gate import as_bags, record_changes, scattering
 from .model.evidence import Evidence
 from .model.record_torque import CONTINUOUS, with_continuous_torque
 from .model.simulated_rig import Model
-from .notes import OUT_OF_TIME, at_limits
+from .notes import at_limits
 from .outcome.diagnosis import Diagnosis
+from .outcome.verdict_words import OUT_OF_TIME
 from .record_judgement import FEWEST_PARTS, Tested, judge_records, tested_causes
 from .which.catalogue import catalogue
 from .which.cell_fits import CellFit, CellFitter
@@ -92,9 +94,14 @@ def investigate_records(
     found, tested = _kept(fitter, found, progress)
     progress("what may stand in for a cause")
     alternatives = {t.effect: _alternatives(fitter, found, t, names) for t in tested}
+    progress("scatter from run to run")
+    changes = record_changes(evidence, found.best.variance, found.best.model)
+    bags = None if changes is None else as_bags(changes, 0.0)
+    if changes is not None and (seen := scattering(changes)):
+        heard.append(f"What scatters from run to run: {seen}.")
     progress("judgement")
     notes = [*records.notes, *cut, *heard, *_notes(evidence, found)]
-    diagnosis = judge_records(fitter, model, found, tested, alternatives, notes)
+    diagnosis = judge_records(fitter, model, found, tested, alternatives, bags, notes)
     return RecordInvestigation(evidence, model, found, tuple(tested), diagnosis)
 
 

@@ -12,9 +12,11 @@ from .how_far.record_ledger import Ledger
 from .model.evidence import Evidence
 from .model.simulated_rig import Model
 from .outcome.diagnosis import (
+    Bags,
     Candidate,
     Cause,
     Diagnosis,
+    Estimate,
     EvidenceKind,
     Figure,
     Gap,
@@ -24,6 +26,7 @@ from .outcome.diagnosis import (
     Verdict,
 )
 from .which.cell_fits import CellFit, CellFitter
+from .which.estimates import with_scatter
 from .which.presence import (
     LEAST_INVARIANCE_P,
     at_its_bound,
@@ -32,14 +35,16 @@ from .which.presence import (
     invariance,
     where_it_acts,
 )
-from .which.stepwise import Found, Gain, gain
+from .which.stepwise import NOTHING_LEFT, Found, Gain, gain
 
-NOTHING_LEFT = 2.0
-"""Mean squared error over noise below which noise explains what is left."""
 PLAIN = 4.0
 """The same for the refit where no effect gains anything."""
 FEWEST_PARTS = 6
 """Parts that select, below which the evidence is too thin for any name."""
+
+LEAST_PRESENT = 0.5
+"""A cause that is there less often than not is not called present."""
+_DOUBTED = 0.2  # over what remains: a cause that closes such a share is there as often as not
 
 THIN = (
     "The records are too short or too few to hold anything out of the fits, so nothing is named: "
@@ -58,6 +63,7 @@ class Tested:
         invariance_p: see `invariance`; None with one level.
         certain: whether the interval of its size lacks zero, and no parameter is at its bound.
         share: how much of what the refit left comes back without it, on unseen parts that select.
+        in_band: how much of what is left without it, it closes where it gains most; see `closed`.
     """
 
     effect: str
@@ -66,18 +72,26 @@ class Tested:
     invariance_p: float | None
     certain: bool
     share: Figure
+    in_band: float
 
     @property
     def passed(self) -> bool:
         """Whether the cause is called present."""
         same = self.invariance_p is None or self.invariance_p >= LEAST_INVARIANCE_P
         closes = self.share.low is None or not self.share.low <= 0.0  # NaN: one part says nothing
-        return self.gain.present and self.certain and same and closes
+        tests = self.gain.present and self.certain and same and closes
+        return tests and self.present >= LEAST_PRESENT
 
     @property
     def present(self) -> float:
-        """Probability that it is there."""
+        """Probability that it is there.
+
+        A cause that closes little even in the band where it gains most may be a part of what no
+        effect explains.
+        """
         sure = (1.0 - min(1.0, 5.0 * self.gain.p)) * min(1.0, self.gain.share + 0.1)
+        closed = max(self.in_band, 0.0)
+        sure *= closed / (closed + _DOUBTED * (1.0 - closed))
         if not self.certain:
             sure *= 0.5
         if self.invariance_p is not None and self.invariance_p < LEAST_INVARIANCE_P:
@@ -102,6 +116,7 @@ def tested_causes(
                 invariance(fitter, fit, effect),
                 beyond_zero(effect, estimates) and not at_its_bound(fit, effect),
                 ledger.share(without.model, fit.model, refit.model),
+                fitter.closed(fit, without),
             )
         )
     return found
@@ -113,6 +128,7 @@ def judge_records(
     found: Found,
     tested: Sequence[Tested],
     alternatives: dict[str, list[str]],
+    bags: Bags | None,
     notes: Sequence[str],
 ) -> Diagnosis:
     """Return the diagnosis of records whose search has ended.
@@ -123,13 +139,17 @@ def judge_records(
         found: the steps of the search; its last fit holds the causes that are kept.
         tested: these causes with their tests.
         alternatives: for each of them what does as well in its place.
+        bags: how far parameters scatter from run to run.
         notes: sentences on the records.
     """
     evidence, best, refit = fitter.evidence, found.best, found.steps[0]
     ledger = Ledger(evidence)
     thin = len(evidence.parts_for("select")) < FEWEST_PARTS
-    estimates = cell_estimates(best, fitter.groups)
-    causes = [] if thin else [_cause(t, fitter, ledger, found, alternatives) for t in tested]
+    fitted = {evidence.parts[p].record for p in fitter.fit_parts}
+    estimates = with_scatter(cell_estimates(best, fitter.groups), bags, len(fitted))
+    causes = (
+        [] if thin else [_cause(t, fitter, ledger, found, alternatives, estimates) for t in tested]
+    )
     causes.sort(key=lambda c: -(c.share.value if c.share else 0.0))
     steps = [
         ledger.step(nominal, None, "nominal"),
@@ -163,6 +183,7 @@ def judge_records(
         gap=Gaps(**gaps, noise_floor=ledger.noise()),
         gap_closed=_closed(ledger, refit.model, best.model) if causes else None,
         where=ledger.places_of_error(refit.model),
+        bags=bags,
         ranking=_ranking(fitter, found),
         parameters=estimates,
         notes=[*([THIN] if thin else []), *notes],
@@ -179,9 +200,9 @@ def _cause(
     ledger: Ledger,
     found: Found,
     alternatives: dict[str, list[str]],
+    estimates: dict[str, Estimate],
 ) -> Cause:
     best = found.best
-    estimates = cell_estimates(best, fitter.groups)
     parameters = {n: e for n, e in estimates.items() if n.startswith(f"{tested.effect}.")}
     moved = where_it_acts(fitter, best, tested.without, ledger.parts)
     return Cause(

@@ -57,7 +57,7 @@ def test_every_file_is_installed_and_every_module_imports(tmp_path: Path) -> Non
     assert files(folder) == files(SOURCE / NAME)
 
 
-@pytest.mark.parametrize("kind", ["launch", "config"])
+@pytest.mark.parametrize("kind", ["launch", "config", "urdf"])
 def test_shared_files_are_installed(kind: str) -> None:
     assert files(installed() / "share" / NAME / kind) == files(SOURCE / kind)
 

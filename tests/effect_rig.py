@@ -153,7 +153,7 @@ class Rig:
         """Return kinetic energy and what all springs and fields hold (J)."""
         v = self.values
         e = effects.DEFAULTS if self.e is None else self.e
-        get = dict(zip(effects.NAMES, e, strict=True)).__getitem__
+        get = dict(zip(effects.NAMES, e, strict=False)).__getitem__
         q, vq, th, vth, q3, v3, _, link, motor, flex = self.x[:10]
         if self.one_body:
             q, vq, v = th, vth, {**v, "k0": 0.0, "k1": 0.0}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.stats import f as f_distribution
 
+from bla_analyzer.bla.sensitivity import sensitivity as sensitivity_of
 from bla_analyzer.results.result import (
     BlaEstimate,
     Comparison,
@@ -135,6 +136,9 @@ def make_level(level=0, amplitude=7e-3, periods=P, seed=1) -> LevelResult:
     y = sensitivity * (truth * c * amplitude + d + v)
     u = c * (amplitude - y)
     bla = _estimate(frequency, u, y, periods)
+    turned_u, played = u.mean(axis=(0, 1)), np.full(frequency.shape, amplitude)
+    found = sensitivity_of(bla.g, bla.radius_95, turned_u, played)
+    bla = bla.model_copy(update={"sensitivity": found})
     time = np.arange(PERIOD) / RATE
     phase = generator.uniform(0, 2 * np.pi, len(frequency))
     turned = np.exp(1j * phase)

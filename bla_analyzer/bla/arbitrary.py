@@ -24,6 +24,7 @@ from fjr_records.spectra import RealizationSpectra
 from ..results.result import BlaEstimate, LineLevels
 from .local_fit import Fit, Run, degrees_of_freedom, fit_window
 from .robust import INPUT_VARIANCE_LIMIT, confidence_radius, f_test
+from .sensitivity import sensitivity
 
 ORDER = 4
 DEGREES = 8
@@ -258,7 +259,8 @@ def _estimate(
 ) -> tuple[BlaEstimate, LineLevels]:
     turn = 1.0 - np.exp(-2j * np.pi * frequency_hz / sample_rate_hz) if slope else 1.0
     g = np.array([fit.g for fit in fits]) / turn
-    input_power = np.array([abs(fit.torque) ** 2 for fit in fits]) * np.abs(turn) ** 2
+    response = np.array([fit.torque for fit in fits])
+    input_power = np.abs(response * turn) ** 2
     var_total = np.array([fit.variance for fit in fits]) / input_power
     left = np.array([fit.of_residual(fit.residual) for fit in fits]) / np.abs(turn) ** 2
     noise = (
@@ -266,13 +268,14 @@ def _estimate(
         / np.abs(turn) ** 2
     )
     spread = np.array([fit.spread for fit in fits])
-    var_noise = noise * spread / np.abs([fit.torque for fit in fits]) ** 2
-    var_input = spread * np.array([fit.residual[0, 0].real for fit in fits])
-    var_input = var_input / np.abs([fit.torque for fit in fits]) ** 2
+    var_noise = noise * spread / np.abs(response) ** 2
+    left_of_input = np.array([fit.residual[0, 0].real for fit in fits])
+    var_input = spread * left_of_input / np.abs(response) ** 2
     power = np.array([fit.power for fit in fits])
     position = np.sqrt(power[:, 2]) / np.abs(turn)
     linear = np.abs(g) ** 2 * power[:, 1]
     degrees = [fit.degrees for fit in fits], [fit.noise_degrees for fit in fits]
+    radius = confidence_radius(var_total, np.array([fit.variance_degrees for fit in fits]))
     bla = BlaEstimate(
         method="local",
         realizations=len(runs),
@@ -283,10 +286,11 @@ def _estimate(
         var_noise=var_noise,
         var_nonlinear=len(runs) * (var_total - var_noise),
         nonlinear_p_value=f_test(left, noise, 2 * np.array(degrees[0]), 2 * np.array(degrees[1])),
-        radius_95=confidence_radius(var_total, np.array([f.variance_degrees for f in fits])),
+        radius_95=radius,
         coherence=linear / (linear + left),
         input_relative_variance=var_input,
         reliable=var_input <= INPUT_VARIANCE_LIMIT,
+        sensitivity=sensitivity(g, radius, response, np.ones(g.size)),
     )
     levels = LineLevels(
         frequency_hz=frequency_hz,

@@ -12,8 +12,9 @@ from ..distortion.levels import corrected_position
 from ..distortion.local_power import local_power
 from ..distortion.resonant_poles import resonant_poles, resonant_power
 from ..distortion.third_order import third_order_power
-from ..results.result import BlaEstimate
+from ..results.result import BlaEstimate, LinkBla
 from .robust import INPUT_VARIANCE_LIMIT, coherence, confidence_radius, f_test
+from .sensitivity import sensitivity
 
 NEIGHBOURS = 8
 """Odd detection lines that tell the distortion at an excited line: some sixteen degrees of freedom,
@@ -29,7 +30,8 @@ def fast_bla(
     The total variance at an excited line is the expected power of Yc = Y - G U there, told by the K
     nearest odd detection lines (`_expected_power`), over |U|^2, with about 2 K degrees of freedom;
     NaN without odd detection lines. The test of nonlinearity compares the mean power of these lines
-    with the mean noise there, F(2 K, 2 K (P-1)). Var(U) is the mean power of U at them.
+    with the mean noise there, F(2 K, 2 K (P-1)). Var(U) is the mean power of U at them. A link
+    position is estimated likewise, with the covariance of both errors.
 
     Args:
         spectra: one realization.
@@ -44,6 +46,49 @@ def fast_bla(
             "The fast method needs two or more periods after the transient and has "
             f"{spectra.periods}; record more periods, or use the robust method."
         )
+    motor, excited = _one_output(spectra, lines, neighbours), lines.excited
+    torque, reference = spectra.torque[excited], spectra.reference[excited]
+    found = sensitivity(motor.g, motor.radius_95, torque, reference)
+    motor = motor.model_copy(update={"sensitivity": found})
+    if spectra.link is None:
+        return motor
+    of_link = spectra.of_link()
+    link = _one_output(of_link, lines, neighbours)
+    power = np.abs(torque) ** 2
+    cov_noise = spectra.noise_of_both(motor.g, link.g, excited) / power
+    cov_total = np.full(link.g.shape, complex(np.nan, np.nan))
+    if lines.odd.size:
+        shape = _correlation(spectra, of_link, motor.g, link.g, lines, neighbours)
+        cov_total = shape * np.sqrt(motor.var_total * link.var_total)
+    return motor.model_copy(update={"link": LinkBla.of(link, cov_total, cov_noise)})
+
+
+def _correlation(
+    spectra: RealizationSpectra,
+    of_link: RealizationSpectra,
+    g: np.ndarray,
+    g_link: np.ndarray,
+    lines: Lines,
+    neighbours: int,
+) -> np.ndarray:
+    """Return the correlation of the errors of both outputs, complex (F,), from detection lines.
+
+    Errors relative to G are alike from line to line where a disturbance acts as the torque does.
+    """
+    odd, excited = lines.odd, lines.excited
+    near = nearest(excited, odd, min(neighbours, odd.size))
+    one, two = (
+        corrected_position(s, each, lines, odd) / interpolate_frf(odd, excited, each)
+        for s, each in ((spectra, g), (of_link, g_link))
+    )
+    cross = (two * one.conj())[near].mean(axis=1)
+    powers = [(np.abs(each) ** 2)[near].mean(axis=1) for each in (one, two)]
+    turn = g_link * g.conj() / np.abs(g_link * g)
+    return cross / np.maximum(np.sqrt(powers[0] * powers[1]), 1e-300) * turn
+
+
+def _one_output(spectra: RealizationSpectra, lines: Lines, neighbours: int) -> BlaEstimate:
+    """Estimate the BLA of motor torque to position."""
     excited = lines.excited
     torque = spectra.torque[excited]
     input_power = np.abs(torque) ** 2

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fjr_records.spectra import RealizationSpectra
+from fjr_records.spectra import LinkSpectra, RealizationSpectra
 
 SAME_PHASES = 0.05
 """Two references whose spectra differ by less than this (relative) are the same realization."""
@@ -44,32 +44,41 @@ def pooled(spectra: Sequence[RealizationSpectra]) -> RealizationSpectra:
     periods = sum(one.periods for one in spectra)
     if len(spectra) == 1:
         return spectra[0]
-    share = np.array([one.periods for one in spectra])[:, None] / periods
-    reference, torque, position = (
-        (share * np.array([getattr(one, name) for one in spectra])).sum(axis=0)
-        for name in ("reference", "torque", "position")
-    )
-    scatter = np.zeros((3, reference.size), complex)
-    for one in spectra:
-        off_torque, off_position = one.torque - torque, one.position - position
-        scatter += one.periods * np.stack(
-            [
-                np.abs(off_torque) ** 2,
-                np.abs(off_position) ** 2,
-                off_position * off_torque.conj(),
-            ]
-        )
-        if one.periods > 1:
-            own = np.stack([one.var_torque, one.var_position, one.cov_position_torque])
-            scatter += one.periods * (one.periods - 1) * own
+    means, covariances = zip(*(_signals(one) for one in spectra), strict=True)
+    counts = np.array([one.periods for one in spectra])
+    mean = np.einsum("i,isf->sf", counts / periods, np.array(means))
+    scatter = np.zeros((len(mean), *mean.shape), complex)
+    for count, own, covariance in zip(counts.tolist(), means, covariances, strict=True):
+        off = own - mean
+        scatter += count * off[:, None] * off[None].conj()
+        if count > 1:
+            scatter += count * (count - 1) * covariance
     scatter /= periods * (periods - 1)
+    share = counts[:, None] / periods
     return RealizationSpectra(
         periods=periods,
         frequency_hz=spectra[0].frequency_hz,
-        reference=reference,
-        torque=torque,
-        position=position,
-        var_torque=scatter[0].real,
-        var_position=scatter[1].real,
-        cov_position_torque=scatter[2],
+        reference=(share * np.array([one.reference for one in spectra])).sum(axis=0),
+        torque=mean[0],
+        position=mean[1],
+        var_torque=scatter[0, 0].real,
+        var_position=scatter[1, 1].real,
+        cov_position_torque=scatter[1, 0],
+        link=None
+        if len(mean) < 3
+        else LinkSpectra(mean[2], scatter[2, 2].real, scatter[2, 0], scatter[2, 1]),
     )
+
+
+def _signals(one: RealizationSpectra) -> tuple[np.ndarray, np.ndarray]:
+    """Return means of torque, position and link, (2 or 3, K+1), and their covariance."""
+    cross = one.cov_position_torque
+    means, rows = [one.torque, one.position], [[one.var_torque + 0j, cross.conj()]]
+    rows.append([cross, one.var_position + 0j])
+    if one.link is not None:
+        link = one.link
+        means.append(link.mean)
+        rows[0].append(link.cov_torque.conj())
+        rows[1].append(link.cov_position.conj())
+        rows.append([link.cov_torque, link.cov_position, link.var + 0j])
+    return np.array(means), np.array(rows)

@@ -10,7 +10,8 @@ from scipy.special import fdtrc
 from fjr_kit.errors import InputError
 from fjr_records.spectra import RealizationSpectra
 
-from ..results.result import BlaEstimate
+from ..results.result import BlaEstimate, LinkBla
+from .sensitivity import sensitivity
 
 INPUT_VARIANCE_LIMIT = 0.02
 """Limit of Var(U)/|U|^2 (17 dB), beyond which a line is not reliable. Bias: with a circular normal
@@ -24,6 +25,9 @@ Carlo; tests/bla_analyzer/test_bla_calibration.py)."""
 def robust_bla(spectra: Sequence[RealizationSpectra], excited: np.ndarray) -> BlaEstimate:
     """Estimate the BLA, its total and noise variance and the stochastic nonlinear variance.
 
+    Where all realizations have a link position, so of that, with the covariance of both errors;
+    where they have a reference, the sensitivity of the loop.
+
     Args:
         spectra: one entry each realization, same grid and same number of periods.
         excited: (F,), excited harmonics.
@@ -31,12 +35,33 @@ def robust_bla(spectra: Sequence[RealizationSpectra], excited: np.ndarray) -> Bl
     Raises:
         InputError: fewer than two realizations.
     """
-    count, periods = len(spectra), spectra[0].periods if spectra else 0
+    count = len(spectra)
     if count < 2:
         raise InputError(
             f"The robust method needs two or more realizations and has {count}; record more, or "
             "use the fast method."
         )
+    motor = _one_output(spectra, excited)
+    torque, position = turned(spectra, excited)
+    played = np.mean([np.abs(one.reference[excited]) for one in spectra], axis=0)
+    found = sensitivity(motor.g, motor.radius_95, torque.mean(axis=0), played)
+    motor = motor.model_copy(update={"sensitivity": found})
+    if any(one.link is None for one in spectra):
+        return motor
+    of_link = [one.of_link() for one in spectra]
+    link = _one_output(of_link, excited)
+    error = position - motor.g * torque
+    error_link = turned(of_link, excited)[1] - link.g * torque
+    scale = 1.0 / (count * np.abs(torque.mean(axis=0)) ** 2)
+    cov_total = (error_link * error.conj()).sum(axis=0) * scale / (count - 1)
+    noise = sum(one.noise_of_both(motor.g, link.g, excited) for one in spectra)
+    cov_noise = noise * scale / count
+    return motor.model_copy(update={"link": LinkBla.of(link, cov_total, cov_noise)})
+
+
+def _one_output(spectra: Sequence[RealizationSpectra], excited: np.ndarray) -> BlaEstimate:
+    """Estimate the BLA of motor torque to position."""
+    count, periods = len(spectra), spectra[0].periods
     torque, position = turned(spectra, excited)
     mean_torque, mean_position = torque.mean(axis=0), position.mean(axis=0)
     input_power = np.abs(mean_torque) ** 2

@@ -33,11 +33,14 @@ from ..results.summary import (
     bla_phase_deg,
     decibel,
     level_name,
+    magnitude_band_db,
     phase_deg,
+    phase_reach_deg,
     signal_at,
     significant,
     total_distortion,
 )
+from .figures_loop import BAND, draw_loop, draw_nyquist
 from .figures_overview import draw_checks, draw_levels
 
 Draw = Callable[[], Figure]
@@ -60,6 +63,8 @@ def _figures(result: Result) -> Iterator[tuple[str, Draw]]:
         stem = f"level_{level.level}"
         if level.bla is not None:
             yield f"{stem}_bla", partial(draw_bla, level, level.bla)
+            yield f"{stem}_loop", partial(draw_loop, level, level.bla)
+            yield f"{stem}_nyquist", partial(draw_nyquist, level, level.bla)
         if level.excited.frequency_hz.size:
             yield f"{stem}_spectra", partial(draw_spectra, level)
             yield f"{stem}_distortion", partial(draw_distortion, level)
@@ -74,14 +79,26 @@ def draw_bla(level: LevelResult, bla: BlaEstimate) -> Figure:
     figure, axes = stacked_axes(2, 4.6, f"BLA, {level_name(level)}", (2.2, 1))
     magnitude, phase = axes
     f = bla.frequency_hz
+    turn = bla_phase_deg(level, bla)
+    reach = phase_reach_deg(bla.g, bla.radius_95)
+    band: Style = {"color": EXCITED, "alpha": BAND, "lw": 0, "zorder": 1.5}
+    ends = magnitude_band_db(bla.g, bla.radius_95)
+    magnitude.fill_between(f, *ends, label="95 % band", **band)
+    phase.fill_between(f, turn - reach, turn + reach, **band)
     _draw_bla_points(magnitude, bla, decibel(bla.g))
-    _draw_bla_points(phase, bla, bla_phase_deg(level, bla))
+    _draw_bla_points(phase, bla, turn)
     for comparison, (colour, dash) in zip(level.comparisons, model_styles(), strict=False):
         line: Style = {"color": colour, "ls": dash, "lw": 0.9, "zorder": 3}
         label = f"{comparison.name}\nV = {comparison.v_mean:.3g} dB²"
         magnitude.plot(f, decibel(comparison.g0), label=label, **line)
         phase.plot(f, phase_deg(comparison.g0), **line)
     _draw_uncertainties(magnitude, bla)
+    if bla.link is not None:
+        link: Style = {"color": EVEN, "marker": "s", "ls": "", "ms": 2}
+        magnitude.plot(f, decibel(bla.link.g), label="BLA,\nlink position", **link)
+        radius: Style = {"color": RADIUS, "ls": ":", "label": "95 % disc,\nlink position"}
+        magnitude.plot(f, decibel(bla.link.radius_95), **radius)
+        phase.plot(f, phase_deg(bla.link.g), **link)
     magnitude.set_ylabel("magnitude (dB re 1 rad/(N m))")
     phase.set_ylabel("phase (degrees)")
     frequency_axis(axes, f)

@@ -22,7 +22,7 @@ from fjr_kit.figure_style import (
 )
 
 from ..results.result import Result
-from ..results.summary import decibel, level_name, summarize
+from ..results.summary import decibel, level_name, magnitude_band_db, summarize
 
 PASSED, FAILED = "#0072B2", "#D55E00"
 SMALLEST_RATIO = 1e-3
@@ -34,6 +34,8 @@ def draw_levels(result: Result) -> Figure:
     figure, [top] = stacked_axes(1, 5.4, "All levels", (1,), bottom_in=2.85)
     for level, shade in zip(result.levels, _shades(len(result.levels)), strict=True):
         if level.bla is not None:
+            ends = magnitude_band_db(level.bla.g, level.bla.radius_95)
+            top.fill_between(level.bla.frequency_hz, *ends, color=shade, alpha=0.25, lw=0)
             line: Style = {"color": shade, "label": level_name(level)}
             top.plot(level.bla.frequency_hz, decibel(level.bla.g), "-", **line)
     top.set_ylabel("BLA (dB re 1 rad/(N m))")

@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
+from controller_node.law import acts_on_error
 from fjr_kit.page import Cell, Mark, Row, render_page
 
 from ..results.findings import all_findings
-from ..results.result import BlaEstimate, Result
+from ..results.loop import what_lacks
+from ..results.result import BlaEstimate, OutputBla, Result
 from ..results.summary import campaign, failed_checks, headline, level_name, summarize
-from .report_plots import level_plots, overview_plots
+from ..results.terms import TERMS
+from .overview_plots import overview_plots
+from .report_plots import level_plots
 
 
 def render_report(result: Result, provenance: Mapping[str, str]) -> str:
@@ -44,6 +50,10 @@ def render_report(result: Result, provenance: Mapping[str, str]) -> str:
         key_numbers=_key_numbers(result),
         distances=_distances(result),
         models={c.name: c.description for level in result.levels for c in level.comparisons},
+        terms=TERMS,
+        lacks=[what_lacks(result, level) for level in result.levels],
+        assumed=acts_on_error(result.controller, result.sample_rate_hz) is None,
+        link_lines=[_link_lines(one.bla) for one in result.levels],
         lines=[None if one.bla is None else _lines(one.bla) for one in result.levels],
         checks=[(c.name, Mark.of(c.passed), c.value, c.limit, c.sentence) for c in checks],
     )
@@ -72,10 +82,24 @@ def _distances(result: Result) -> dict[str, list[Any]]:
     return {"rows": rows, "levels": [i for i, _, _ in found]}
 
 
+def _link_lines(bla: BlaEstimate | None) -> list[Row] | None:
+    """Return the BLA of the link position line by line; None where there is none."""
+    if bla is None or bla.link is None:
+        return None
+    with np.errstate(divide="ignore", invalid="ignore"):
+        size = np.sqrt(bla.link.var_total * bla.var_total)
+        correlation = np.abs(bla.link.cov_total) / size
+    return _rows(bla.frequency_hz, bla.link, correlation.tolist())
+
+
 def _lines(bla: BlaEstimate) -> list[Row]:
     """Return the BLA line by line."""
-    arrays = [bla.frequency_hz, bla.g.real, bla.g.imag, bla.radius_95, bla.var_noise]
-    arrays += [bla.var_nonlinear, bla.nonlinear_p_value, bla.coherence]
-    arrays += [bla.input_relative_variance]
     words: list[Cell] = ["yes" if flag else "no" for flag in bla.reliable]
-    return list(zip(*(array.tolist() for array in arrays), words, strict=True))
+    return _rows(bla.frequency_hz, bla, bla.input_relative_variance.tolist(), words)
+
+
+def _rows(frequency_hz: np.ndarray, one: OutputBla, *more: Sequence[Cell]) -> list[Row]:
+    """Return the lines of one output; `more` are further columns."""
+    arrays = [frequency_hz, one.g.real, one.g.imag, one.radius_95, one.var_noise]
+    arrays += [one.var_nonlinear, one.nonlinear_p_value, one.coherence]
+    return list(zip(*(array.tolist() for array in arrays), *more, strict=True))

@@ -6,19 +6,15 @@ light, dark and print share one description.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from fjr_kit.plots import (
-    LOG,
     SECONDS,
     Options,
     Plot,
     Trace,
+    area,
     extremes,
-    frequency_layout,
-    layout,
     linked,
     numbers,
     stack,
@@ -26,17 +22,18 @@ from fjr_kit.plots import (
 )
 from fjr_records.realization import TimeSignals
 
-from ..results.result import BlaEstimate, LevelResult, LineLevels, Result
+from ..results.result import BlaEstimate, LevelResult, LineLevels, OutputBla
 from ..results.summary import (
     bla_phase_deg,
     decibel,
-    level_name,
+    magnitude_band_db,
     phase_deg,
+    phase_reach_deg,
     signal_at,
     significant,
-    summarize,
     total_distortion,
 )
+from .loop_plots import loop_plots
 
 SIGMA = "\N{GREEK SMALL LETTER SIGMA}"
 KINDS = (
@@ -44,7 +41,6 @@ KINDS = (
     ("odd", "odd detection lines", "--odd", "triangle-up"),
     ("even", "even lines", "--even", "square"),
 )
-AMPLITUDE = "%{x:.4g} rad"
 MODEL_LINES = (("--ink", "solid"), ("--model", "dash"), ("--ink", "dot"), ("--model", "dashdot"))
 
 
@@ -53,14 +49,9 @@ def level_plots(level: LevelResult) -> dict[str, Plot]:
     plots = {"time": _time(level.signals)}
     if level.excited.frequency_hz.size:
         plots = {"spectra": _spectra(level), "distortion": _distortion(level)} | plots
-    return plots if level.bla is None else {"bla": _bla(level, level.bla)} | plots
-
-
-def overview_plots(result: Result) -> dict[str, Plot]:
-    """Return the plots over all levels; none if there is only one level."""
-    if len(result.levels) < 2:
-        return {}
-    return {"all-bla": _all_bla(result), "all-v": _all_v(result), "all-power": _all_power(result)}
+    if level.bla is None:
+        return plots
+    return {"bla": _bla(level, level.bla), **loop_plots(level.bla)} | plots
 
 
 def _bla(level: LevelResult, bla: BlaEstimate) -> Plot:
@@ -70,9 +61,20 @@ def _bla(level: LevelResult, bla: BlaEstimate) -> Plot:
         traces.append(trace(f, decibel(c.g0), c.name, color, dash=dash, unit="dB"))
         phase: Options = {"row": 2, "showlegend": False, "unit": "degrees"}
         traces.append(trace(f, phase_deg(c.g0), c.name, color, dash=dash, **phase))
-    traces += _uncertainties(bla) + _bla_points(level, bla)
+    traces += _uncertainties(bla) + _bands(level, bla)
+    traces += _link_points(bla) + _bla_points(level, bla)
     titles = ["magnitude (dB re 1 rad/(N m))", "phase (degrees)"]
     return linked(traces, titles, [2.2, 1.0], f)
+
+
+def outputs(level: LevelResult, bla: BlaEstimate) -> list[tuple[OutputBla, np.ndarray, str, str]]:
+    """Return the BLA, phase (degrees), ending of its name and colour of each output."""
+    made: list[tuple[OutputBla, np.ndarray, str, str]] = [
+        (bla, bla_phase_deg(level, bla), "", "--excited")
+    ]
+    if bla.link is not None:
+        made.append((bla.link, phase_deg(bla.link.g), ", link position", "--even"))
+    return made
 
 
 def _model_lines(level: LevelResult) -> tuple[list[str], list[str]]:
@@ -95,6 +97,34 @@ def _bla_points(level: LevelResult, bla: BlaEstimate) -> list[Trace]:
             mark |= {"row": 2, "showlegend": False, "unit": "degrees"}
             traces.append(trace(f, phase[keep], name, "--excited", **mark))
     return traces
+
+
+def _bands(level: LevelResult, bla: BlaEstimate) -> list[Trace]:
+    """Return the bands that the discs of each output span, in magnitude and phase."""
+    f, traces = bla.frequency_hz, []
+    for one, phase, what, color in outputs(level, bla):
+        name = f"95 % band{what}"
+        traces.append(area(f, *magnitude_band_db(one.g, one.radius_95), name, color))
+        reach = phase_reach_deg(one.g, one.radius_95)
+        lower: Options = {"row": 2, "showlegend": False}
+        traces.append(area(f, phase - reach, phase + reach, name, color, **lower))
+    return traces
+
+
+def _link_points(bla: BlaEstimate) -> list[Trace]:
+    """Return the BLA of the link position, with the radius of its disc, where there is one."""
+    if bla.link is None:
+        return []
+    f, link, name = bla.frequency_hz, bla.link, "BLA, link position"
+    mark: Options = {"symbol": "square", "size": 4}
+    dashed: Options = {"dash": "dot", "unit": "dB"}
+    return [
+        trace(f, decibel(link.radius_95), "95 % disc, link position", "--radius", **dashed),
+        trace(f, decibel(link.g), name, "--even", **mark, unit="dB"),
+        trace(
+            f, phase_deg(link.g), name, "--even", **mark, row=2, showlegend=False, unit="degrees"
+        ),
+    ]
 
 
 def _uncertainties(bla: BlaEstimate) -> list[Trace]:
@@ -172,58 +202,3 @@ def _time(signals: TimeSignals) -> Plot:
         traces.append(trace(t, y, name, "--ink", **style, unit=unit, at=SECONDS))
     titles = [f"{name} ({unit})" for name, _, unit in shown]
     return {"data": traces, "layout": stack(titles, [1.0] * len(shown), "time (s)")}
-
-
-def _amplitudes(result: Result) -> np.ndarray:
-    return np.array(
-        [
-            np.sqrt(np.mean(level.amplitude_rad**2)) if level.amplitude_rad.size else np.nan
-            for level in result.levels
-        ]
-    )
-
-
-def _all_bla(result: Result) -> Plot:
-    """Return the BLA of all levels; a click on one selects its level."""
-    traces = []
-    for i, level in enumerate(result.levels):
-        if level.bla is not None:
-            f, y = level.bla.frequency_hz, decibel(level.bla.g)
-            shade = f"--level{round(4 * i / (len(result.levels) - 1))}"
-            traces.append(trace(f, y, level_name(level), shade, dash="solid", unit="dB", meta=i))
-    f = result.levels[0].excited.frequency_hz
-    return {"data": traces, "layout": frequency_layout(["BLA (dB re 1 rad/(N m))"], [1.0], f)}
-
-
-def _all_v(result: Result) -> Plot:
-    """Return V of every model against amplitude."""
-    names = list(dict.fromkeys(c.name for level in result.levels for c in level.comparisons))
-    traces = []
-    for i, name in enumerate(names):
-        color, dash = MODEL_LINES[i % len(MODEL_LINES)]
-        found = [{c.name: c.v_mean for c in level.comparisons} for level in result.levels]
-        v = np.array([values.get(name, np.nan) for values in found])
-        style: Options = {"dash": dash, "symbol": "circle", "at": AMPLITUDE}
-        traces.append(trace(_amplitudes(result), v, name, color, **style, unit="dB²"))
-    return {"data": traces, "layout": _amplitude_layout(result, "V (dB²)")}
-
-
-def _all_power(result: Result) -> Plot:
-    """Return the mean power at each kind of line against amplitude."""
-    sums = [summarize(level) for level in result.levels]
-    kinds = (("linear_db", *KINDS[0][1:]), *((f"{k}_db", *rest) for k, *rest in KINDS[1:]))
-    traces = []
-    for field, name, color, symbol in (*kinds, ("noise_db", "noise", "--noise", "circle")):
-        y = np.array([getattr(number, field) for number in sums])
-        if np.isfinite(y).any():
-            style: Options = {"dash": "solid", "symbol": symbol, "at": AMPLITUDE}
-            traces.append(trace(_amplitudes(result), y, name, color, **style, unit="dB re 1 rad"))
-    return {"data": traces, "layout": _amplitude_layout(result, "mean power (dB re 1 rad)")}
-
-
-def _amplitude_layout(result: Result, title: str) -> dict[str, Any]:
-    made = layout("amplitude of a line (rad, rms)", title)
-    amplitude = _amplitudes(result)
-    if amplitude.min() > 0 and amplitude.max() > 3 * amplitude.min():
-        made["xaxis"] |= LOG | {"dtick": "D2"}
-    return made

@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from .loop import peak_sentence
 from .result import BlaEstimate, LevelResult, LineLevels, Result
 from .summary import (
     AT_NOISE_DB,
@@ -34,6 +35,7 @@ def findings(level: LevelResult) -> list[str]:
         *_detection_sentences(level),
         *_total_sentences(level, level.bla),
         *_line_sentences(level, level.bla),
+        peak_sentence(level.bla),
     ]
     return [sentence for sentence in sentences if sentence]
 

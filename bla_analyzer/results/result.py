@@ -20,15 +20,10 @@ Method = Literal["robust", "fast", "local"]
 Excitation = Literal["periodic", "repeated", "arbitrary"]
 
 
-class BlaEstimate(EqualArrays):
-    """BLA at the F excited lines, with variances (paper.md robust and fast method).
+class OutputBla(EqualArrays):
+    """BLA from motor torque to one output, at the F excited lines.
 
     Attributes:
-        method: robust (over realizations), fast (one realization, detection lines) or local (local
-            polynomials over neighbouring lines, any excitation).
-        realizations: M, how many references were played.
-        periods: P, periods kept in each realization, or records that repeat a reference.
-        frequency_hz: (F,).
         g: complex (F,), G_BLA = Y/U of the reference-phased means.
         var_total: (F,) variance of g from nonlinearity and noise together.
         var_noise: (F,) variance of g from noise alone; NaN where P = 1.
@@ -40,14 +35,8 @@ class BlaEstimate(EqualArrays):
         radius_95: (F,) radius of the 95 % confidence disc of g.
         coherence: (F,) share of the power of Y in one realization that is G U; the rest is
             distortion and noise, the answer of the loop to them taken away. NaN where unknown.
-        input_relative_variance: (F,) Var(U)/|U|^2 of the mean torque spectrum.
-        reliable: bool (F,), False where Var(U)/|U|^2 is not small.
     """
 
-    method: Method
-    realizations: Annotated[int, Unit("1")]
-    periods: Annotated[int, Unit("1")]
-    frequency_hz: Annotated[np.ndarray, Array("Hz")]
     g: Annotated[np.ndarray, Array("rad/(N m)", complex)]
     var_total: Annotated[np.ndarray, Array("(rad/(N m))^2")]
     var_noise: Annotated[np.ndarray, Array("(rad/(N m))^2")]
@@ -55,8 +44,71 @@ class BlaEstimate(EqualArrays):
     nonlinear_p_value: Annotated[np.ndarray, Array("1")]
     radius_95: Annotated[np.ndarray, Array("rad/(N m)")]
     coherence: Annotated[np.ndarray, Array("1")]
+
+
+class LinkBla(OutputBla):
+    """BLA of a second output, motor torque to link position, at the lines of the first one.
+
+    Attributes:
+        cov_total: complex (F,), covariance E{e_link e_motor*} of the errors of both estimates;
+            with the two var_total it is their joint covariance.
+        cov_noise: complex (F,), the part of it that is noise; NaN where P = 1.
+    """
+
+    cov_total: Annotated[np.ndarray, Array("(rad/(N m))^2", complex)]
+    cov_noise: Annotated[np.ndarray, Array("(rad/(N m))^2", complex)]
+
+    @classmethod
+    def of(cls, bla: OutputBla, cov_total: np.ndarray, cov_noise: np.ndarray) -> LinkBla:
+        """Return the estimate of the link position with its covariance with that of the motor's."""
+        own = {name: getattr(bla, name) for name in OutputBla.model_fields}
+        return cls(**own, cov_total=cov_total, cov_noise=cov_noise)
+
+
+class Sensitivity(EqualArrays):
+    """Response of the loop from reference to error, at the lines of the BLA.
+
+    Attributes:
+        s: complex (F,), (R - Y)/R; it is S = 1/(1 + G C) where the controller C acts on the error.
+        s_radius_95: (F,) radius of its 95 % confidence disc; NaN where unknown.
+    """
+
+    s: Annotated[np.ndarray, Array("1", complex)]
+    s_radius_95: Annotated[np.ndarray, Array("1")]
+
+
+class BlaEstimate(OutputBla):
+    """BLA of the motor position, with variances (paper.md robust and fast method).
+
+    Attributes:
+        method: robust (over realizations), fast (one realization, detection lines) or local (local
+            polynomials over neighbouring lines, any excitation).
+        realizations: M, how many references were played.
+        periods: P, periods kept in each realization, or records that repeat a reference.
+        frequency_hz: (F,).
+        input_relative_variance: (F,) Var(U)/|U|^2 of the mean torque spectrum.
+        reliable: bool (F,), False where Var(U)/|U|^2 is not small.
+        link: BLA of the link position; None without a second encoder, or by the local method.
+        sensitivity: of the loop; None without a reference, or where the controller does not act on
+            the error alone.
+    """
+
+    method: Method
+    realizations: Annotated[int, Unit("1")]
+    periods: Annotated[int, Unit("1")]
+    frequency_hz: Annotated[np.ndarray, Array("Hz")]
     input_relative_variance: Annotated[np.ndarray, Array("1")]
     reliable: Annotated[np.ndarray, Array("bool", bool)]
+    link: LinkBla | None = None
+    sensitivity: Sensitivity | None = None
+
+    @model_validator(mode="after")
+    def _parts_at_the_lines(self) -> BlaEstimate:
+        if self.link is not None and self.link.g.size != self.g.size:
+            raise ValueError(f"link: g must hold {self.g.size} values")
+        if self.sensitivity is not None and self.sensitivity.s.size != self.g.size:
+            raise ValueError(f"sensitivity: s must hold {self.g.size} values")
+        return self
 
 
 class LineLevels(EqualArrays):

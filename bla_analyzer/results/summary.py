@@ -54,6 +54,20 @@ def bla_phase_deg(level: LevelResult, bla: BlaEstimate) -> np.ndarray:
     return phase_deg(g0) + np.angle(bla.g / g0, deg=True)
 
 
+def magnitude_band_db(g: np.ndarray, radius: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return least and greatest magnitude within the discs, in dB; open below 20 dB under |G|."""
+    size = np.abs(g)
+    return decibel(np.maximum(size - radius, 0.1 * size)), decibel(size + radius)
+
+
+def phase_reach_deg(g: np.ndarray, radius: np.ndarray) -> np.ndarray:
+    """Return how far the phase reaches within the discs, in degrees; 180 where they hold zero."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = radius / np.abs(g)
+    reach = np.degrees(np.arcsin(np.minimum(ratio, 1.0)))
+    return np.where(ratio >= 1.0, 180.0, reach)
+
+
 def signal_at(level: LevelResult, lines: LineLevels, signal: str) -> np.ndarray:
     """Return reference, torque or position at `lines`.
 

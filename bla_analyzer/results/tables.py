@@ -6,6 +6,7 @@ import csv
 import io
 import json
 import re
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -31,25 +32,39 @@ BLA_COLUMNS = {
 }
 """Column of frf.csv for each real array of the BLA."""
 
+LINK_COLUMNS = {
+    "g.real": "link_g_re_rad_per_nm",
+    "g.imag": "link_g_im_rad_per_nm",
+    "var_total": "link_var_total_rad2_per_nm2",
+    "var_noise": "link_var_noise_rad2_per_nm2",
+    "radius_95": "link_radius_95_rad_per_nm",
+    "cov_total.real": "link_cov_total_re_rad2_per_nm2",
+    "cov_total.imag": "link_cov_total_im_rad2_per_nm2",
+}
+"""Columns of frf.csv for the link position, where a level has one: array, and part of it."""
+
 UNITS = units(LevelResult)
 """Unit of every numeric field of a level."""
-
-HEADER = b"MATLAB 5.0 MAT-file, fjr_rig/result/2"
 
 
 def frf_csv(result: Result) -> str:
     """Return frf.csv: one row for each excited line of each level that has a BLA.
 
     The header names the unit of each column; numbers are written so that they read back exactly;
-    unknown is NaN. Models come last, two columns each.
+    unknown is NaN. Models come after the BLA, two columns each; the link position, if any, last.
     """
     names = list(dict.fromkeys(c.name for level in result.levels for c in level.comparisons))
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(_header(names))
+    linked = any(level.bla is not None and level.bla.link is not None for level in result.levels)
+    writer.writerow(_header(names) + linked * [*LINK_COLUMNS.values()])
     for level in result.levels:
         if level.bla is not None:
-            writer.writerows(_rows(level, level.bla, names))
+            rows = _rows(level, level.bla, names)
+            if linked:
+                links = zip(*_link_columns(level.bla), strict=True)
+                rows = [(*row, *link) for row, link in zip(rows, links, strict=True)]
+            writer.writerows(rows)
     return text.getvalue()
 
 
@@ -80,6 +95,12 @@ def _rows(level: LevelResult, bla: BlaEstimate, models: list[str]) -> list[tuple
     texts = [[str(level.level)] * len(bla.g), *map(_texts, columns)]
     texts += [[str(int(flag)) for flag in bla.reliable], *map(_texts, after)]
     return list(zip(*texts, strict=True))
+
+
+def _link_columns(bla: BlaEstimate) -> list[list[str]]:
+    if bla.link is None:
+        return [["NaN"] * bla.g.size for _ in LINK_COLUMNS]
+    return [_texts(attrgetter(name)(bla.link)) for name in LINK_COLUMNS]
 
 
 def _texts(values: np.ndarray) -> list[str]:
@@ -127,13 +148,21 @@ def frf_mat(result: Result) -> bytes:
 
     `result.level` is a 1 x L struct array; arrays are columns; what is None is empty.
     """
-    top = {n: _matlab(value) for n, value in result if n not in ("schema_name", "levels")}
-    top["level"] = _struct_array(result.levels)
+    return mat_file({"result": matlab_struct(result), "units": UNITS}, "fjr_rig/result/2")
+
+
+def matlab_struct(document: BaseModel) -> dict[str, Any]:
+    """Return a document that has levels as a struct; `level` is a 1 x L struct array."""
+    top = {n: _matlab(value) for n, value in document if n not in ("schema_name", "levels")}
+    return top | {"level": _struct_array(document.levels)}  # type: ignore[attr-defined]
+
+
+def mat_file(content: dict[str, Any], schema: str) -> bytes:
+    """Return a MATLAB 5 file, the same bytes for the same content."""
     buffer = io.BytesIO()
-    content = {"result": top, "units": UNITS}
     scipy.io.savemat(buffer, content, long_field_names=True, do_compression=True, oned_as="column")
     # scipy writes the date into the first 116 bytes; the same result must give the same file.
-    return HEADER.ljust(116) + buffer.getvalue()[116:]
+    return f"MATLAB 5.0 MAT-file, {schema}".encode().ljust(116) + buffer.getvalue()[116:]
 
 
 def _matlab(value: Any) -> Any:
@@ -143,7 +172,8 @@ def _matlab(value: Any) -> Any:
     if isinstance(value, BaseModel):
         return {name: _matlab(item) for name, item in value}
     if isinstance(value, dict):
-        return {key: _matlab(item) for key, item in value.items() if _is_matlab_name(key)}
+        named = {key.replace(".", "_"): item for key, item in value.items()}
+        return {key: _matlab(item) for key, item in named.items() if _is_matlab_name(key)}
     if isinstance(value, tuple) and value and isinstance(value[0], BaseModel):
         return _struct_array(value)
     if isinstance(value, tuple | list) and all(isinstance(item, str) for item in value):
@@ -194,8 +224,6 @@ def to_frd(result: Result, level: int) -> control.FrequencyResponseData:
     try:
         import control
     except ImportError:
-        raise InputError(
-            "control.FRD needs python-control; install it with 'pip install control'."
-        ) from None
+        raise InputError("control.FRD needs python-control; install fjr-rig[control].") from None
     bla = found.bla
     return control.FRD(bla.g, 2.0 * np.pi * bla.frequency_hz, name=f"BLA level {level}")

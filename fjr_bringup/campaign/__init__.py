@@ -2,5 +2,6 @@
 
 Begin with `plan.Campaign` (all parameters, checked, and the folder); `settings` reads single
 parameters that win over a file, `batch_run` simulates what the folder lacks, `progress` shows how
-far it is.
+far it is, `live` the BLA so far (a `chart`), `estimate` what it takes. `example_files` writes what
+other rigs would have recorded.
 """

@@ -11,6 +11,7 @@ from fjr_interface.topics import NODES
 from fjr_kit.processes import ProcessGroup
 from fjr_kit.stopping import Interruption
 
+from ..campaign.live import LiveBla
 from ..campaign.plan import CAMPAIGN_FILE, Campaign
 from ..campaign.progress import CampaignProgress
 from .conductor import Conductor
@@ -25,7 +26,12 @@ ROLES: dict[str, dict[str, Any]] = {
 
 
 def run_campaign(
-    campaign: Campaign, folder: Path, *, composed: bool = False, progress: CampaignProgress
+    campaign: Campaign,
+    folder: Path,
+    *,
+    composed: bool = False,
+    live: LiveBla | None = None,
+    progress: CampaignProgress,
 ) -> list[Path]:
     """Run what the folder lacks of a campaign through the ROS graph.
 
@@ -33,6 +39,7 @@ def run_campaign(
         campaign: what to run.
         folder: experiment folder; an interrupted campaign in it is resumed.
         composed: all nodes in one process instead of one each.
+        live: told of each bag; what it finds good enough is not recorded further.
         progress: where progress is shown.
 
     Returns:
@@ -43,6 +50,9 @@ def run_campaign(
     """
     pending = campaign.open_folder(folder)
     progress.expect(campaign, pending)
+    if live is not None:
+        live.take_up(folder, pending)
+        pending = [run for run in pending if not live.enough(run[0])]
     if not pending:
         return []
     logs = folder / "log"
@@ -58,10 +68,14 @@ def run_campaign(
             start_nodes(processes, NODES, files, logs)
         with Conductor(processes, interruption) as conductor:
             conductor.wait_for_graph()
-            return [
-                conductor.record(campaign, folder, level, realization, progress)
-                for level, realization in pending
-            ]
+            bags = []
+            for level, realization in pending:
+                if live is not None and live.enough(level):
+                    continue
+                bags.append(conductor.record(campaign, folder, level, realization, progress))
+                if live is not None:
+                    live.take(level, realization, bags[-1])
+            return bags
 
 
 def save_roles(logs: Path, roles: Mapping[str, Mapping[str, Any]]) -> Path:

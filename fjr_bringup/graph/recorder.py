@@ -26,8 +26,8 @@ from fjr_interface.experiment import Experiment
 from fjr_interface.ros import runtime
 from fjr_kit.errors import InputError
 
-_STAMP = slice(4, 12)
-_STAMP_FORMAT = struct.Struct("<iI")
+STAMP = slice(4, 12)
+STAMP_FORMAT = struct.Struct("<iI")
 
 
 class Recorder:
@@ -108,14 +108,14 @@ class Recorder:
     def _write_complete_samples(self, writer: BagWriter) -> None:
         before = self.samples
         queues, stamps = self._queues, self._stamps
-        for _ in range(min(map(len, queues))):
+        for _ in range(self._ready()):
             if self.samples == len(stamps):
                 raise InputError("More samples arrived than the experiment has; start it again.")
             payloads = [queue.popleft() for queue in queues]
             stamp = stamps[self.samples]
-            expected = _STAMP_FORMAT.pack(*divmod(stamp, 1_000_000_000))
+            expected = STAMP_FORMAT.pack(*divmod(stamp, 1_000_000_000))
             for signal, payload in zip(self.signals, payloads, strict=True):
-                if payload[_STAMP] != expected:
+                if payload[STAMP] != expected:
                     raise InputError(
                         f"{self._folder}: topic {signal.absolute_topic}, sample "
                         f"{self.samples + 1}: stamp {_stamp_of(payload) * 1e-9:.6f} s where "
@@ -126,6 +126,10 @@ class Recorder:
             self.samples += 1
         if self.samples > before:
             self._set_pace(stamps[self.samples - 1])
+
+    def _ready(self) -> int:
+        """Return how many samples have all their signals."""
+        return min(map(len, self._queues))
 
     def _set_pace(self, stamp_ns: int) -> None:
         seconds, nanoseconds = divmod(stamp_ns, 1_000_000_000)
@@ -150,5 +154,5 @@ class Recorder:
 
 
 def _stamp_of(payload: bytes) -> int:
-    seconds, nanoseconds = _STAMP_FORMAT.unpack_from(payload, 4)
+    seconds, nanoseconds = STAMP_FORMAT.unpack_from(payload, 4)
     return seconds * 1_000_000_000 + nanoseconds

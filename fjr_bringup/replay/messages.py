@@ -7,7 +7,6 @@ of these, it is the time at which the message was recorded.
 
 from __future__ import annotations
 
-import importlib
 import itertools
 import struct
 from collections.abc import Iterator, Sequence
@@ -29,6 +28,7 @@ from fjr_interface.bags.metadata import TopicMetadata
 from fjr_interface.bags.plain_yaml import load_plain_yaml
 from fjr_interface.experiment import CUSTOM_DATA_KEY
 from fjr_interface.ros import runtime
+from fjr_interface.ros.messages import message_class
 from fjr_interface.topics import (
     EXPERIMENT_TOPIC,
     LINK_POSITION,
@@ -138,7 +138,7 @@ class Messages:
         """Take a topic in, or note why it is left out."""
         if topic.name in self._played:
             return
-        kind = _message_class(topic.type)
+        kind = message_class(topic.type)
         encoding = topic.serialization_format
         if kind is None or encoding != "cdr":
             why = f"the type {topic.type} is not installed" if kind is None else encoding
@@ -264,12 +264,3 @@ def _means(wanted: str, topic: str) -> bool:
     """Tell whether a name, or the last words of one, means a topic."""
     relative = not wanted.startswith("/") and topic.endswith(f"/{wanted}")
     return relative or topic == wanted
-
-
-def _message_class(name: str) -> Any:
-    """Return the class of `package/msg/Name`; None if it is not installed."""
-    package, _, kind = name.partition("/msg/")
-    try:
-        return getattr(importlib.import_module(f"{package}.msg"), kind)
-    except (ImportError, AttributeError):
-        return None

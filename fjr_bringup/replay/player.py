@@ -17,7 +17,7 @@ from rclpy.signals import SignalHandlerOptions
 from rosgraph_msgs.msg import Clock
 
 from fjr_interface.ros import runtime
-from fjr_interface.topics import NAMESPACE, clock_message
+from fjr_interface.topics import NAMESPACE, clock_message, clock_ns
 from fjr_kit.errors import InputError
 from fjr_kit.stopping import Interruption
 
@@ -30,6 +30,7 @@ NODE = "replay"
 
 _DISCOVERY_S = 1.0
 _PAUSE_S = 0.02
+_CLOCK_PAUSE_S = 0.001
 _SAY_S = 3.0
 _LOOK_S = 0.1
 _LAST_S = 4.0  # at the end, for what DDS must repeat: by default every 3 s
@@ -112,6 +113,36 @@ class _Output:
         return PublishedTopic(self.topic.name, self.messages, qos, self.readers)
 
 
+class ExternalClock:
+    """The /clock of another program, such as a simulator."""
+
+    def __init__(self, node: Node) -> None:
+        """Subscribe on a node that no executor spins."""
+        self._subscription = node.create_subscription(
+            Clock, CLOCK, lambda _: None, runtime.CLOCK_QOS, raw=True
+        )
+        self._now_ns: int | None = None
+        self._begun_ns = 0
+
+    def begin(self) -> bool:
+        """Count from now; return whether there is a time."""
+        self._look()
+        self._begun_ns = self._now_ns or 0
+        return self._now_ns is not None
+
+    def passed_s(self) -> float:
+        """Return the time since the beginning; raise InputError if it has gone back."""
+        self._look()
+        passed = (self._now_ns or 0) - self._begun_ns
+        if passed < 0:
+            raise InputError(f"{CLOCK} has gone back to before the replay began; begin it again.")
+        return passed * 1e-9
+
+    def _look(self) -> None:
+        for message in runtime.take_all(self._subscription):
+            self._now_ns = clock_ns(message)
+
+
 class Player:
     """Publishes the messages of one bag on their topics."""
 
@@ -122,10 +153,16 @@ class Player:
         self._node, self._messages, self._publishing = node, messages, publishing
         self._interruption = interruption
         self._progress = CampaignProgress(done="played")
-        paced = math.isinf(publishing.rate)
-        self._outputs = {topic.name: _Output(node, topic, paced) for topic in messages.topics}
+        # without a pace of its own, or after a jump of another's clock, much is due at once
+        paced = math.isinf(publishing.rate) or publishing.follow_clock
+        own = not publishing.follow_clock
+        played = [topic for topic in messages.topics if own or topic.name != CLOCK]
+        self._outputs = {topic.name: _Output(node, topic, paced) for topic in played}
         self._ticks: _Output | None = None
-        if CLOCK not in self._outputs:
+        self._clock: ExternalClock | None = None
+        if publishing.follow_clock:
+            self._clock = ExternalClock(node)
+        elif CLOCK not in self._outputs:
             self._ticks = _Output(node, PlayedTopic(CLOCK, Clock, runtime.CLOCK_QOS), False)
             self._outputs[CLOCK] = self._ticks
         self._begun_s = self._took_s = self._late_s = 0.0
@@ -198,6 +235,8 @@ class Player:
         return any(output.messages for output in outputs if not output.topic.latched)
 
     def _play_once(self) -> None:
+        if self._clock is not None:
+            self._begin_by_clock(self._clock)
         skip_ns = at_ns = round(self._publishing.start_offset_s * 1e9)
         before_ns, begun_s = self._played_ns, time.monotonic()
         looked_s, ticked_ns = 0.0, -1
@@ -209,13 +248,28 @@ class Player:
             if message.offset_ns < skip_ns and not message.topic.latched:
                 continue
             at_ns = max(at_ns, message.offset_ns)
-            self._keep_pace(begun_s + (at_ns - skip_ns) * 1e-9 / self._publishing.rate)
+            passed_s = (at_ns - skip_ns) * 1e-9 / self._publishing.rate
+            if self._clock is None:
+                self._keep_pace(begun_s + passed_s)
+            else:
+                while self._clock.passed_s() < passed_s:
+                    self._pause(_CLOCK_PAUSE_S)
             if self._ticks is not None and message.clock_ns > ticked_ns:
                 ticked_ns = message.clock_ns
                 self._send(self._ticks, clock_message(ticked_ns))
-            self._send(self._outputs[message.topic.name], message.data)
+            if message.topic.name in self._outputs:  # a recorded /clock is not, beside another
+                self._send(self._outputs[message.topic.name], message.data)
             self._played_ns = before_ns + at_ns - skip_ns
             self._took_s = time.monotonic() - self._begun_s
+
+    def _begin_by_clock(self, clock: ExternalClock) -> None:
+        """Take the time of the external clock now for the beginning."""
+        said_s = time.monotonic() + _SAY_S
+        while not clock.begin():
+            if time.monotonic() > said_s:
+                self._progress.say(f"Waiting for {CLOCK}, which nobody publishes.")
+                said_s = math.inf
+            self._pause(_PAUSE_S)
 
     def _keep_pace(self, due_s: float) -> None:
         """Wait for a message's time, or see how late it is."""

@@ -15,6 +15,7 @@ class Publishing:
         start_offset_s: how far into the bag it begins (s).
         loop: whether it begins again at the end.
         wait_for: nodes that must read one of the topics before it begins.
+        follow_clock: whether another program's /clock keeps the time, instead of this machine's.
     """
 
     rate: float = 1.0
@@ -22,6 +23,7 @@ class Publishing:
     start_offset_s: float = 0.0
     loop: bool = False
     wait_for: tuple[str, ...] = ()
+    follow_clock: bool = False
 
 
 @dataclass(frozen=True)

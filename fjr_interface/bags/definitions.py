@@ -60,8 +60,38 @@ def typestore(topic: Topic) -> Any:
         DefinitionError: the definition is damaged, or beyond the bounds.
     """
     store = get_typestore(Stores.ROS2_JAZZY)
-    if topic.type in store.types:
-        return store
+    if topic.type not in store.types:
+        types = _types(topic, store)
+        try:
+            store.register(types)
+        except Exception:  # one of them is also a type of Jazzy, and another
+            raise DefinitionError("cannot be understood") from None
+    return store
+
+
+def is_standard(topic: Topic) -> bool:
+    """Tell whether the type of a topic is one that Jazzy brings along."""
+    return topic.type in get_typestore(Stores.ROS2_JAZZY).types
+
+
+def differs_from_standard(topic: Topic) -> bool:
+    """Tell whether the bag's definition of a type of Jazzy, or of a part of it, is another.
+
+    Raises:
+        DefinitionError: the definition is damaged, or beyond the bounds.
+    """
+    store = get_typestore(Stores.ROS2_JAZZY)
+    if topic.type not in store.types or not topic.definition.strip():
+        return False
+    types = _types(topic, store)
+    return any(
+        name in store.fielddefs and store.fielddefs[name][1] != definition[1]
+        for name, definition in types.items()
+    )
+
+
+def _types(topic: Topic, store: Any) -> dict[str, Any]:
+    """Return the types that a topic's definition defines, as `rosbags` has them."""
     idl = topic.definition_format in _IDL
     text = (_NO_IDL if idl else _NO_FIELD).sub("", topic.definition)
     if len(text) > MAX_DEFINITION:
@@ -73,12 +103,11 @@ def typestore(topic: Topic) -> Any:
             types = get_types_from_msg(text, topic.type)
         if _fields(topic.type, {**store.fielddefs, **types}, {}) > MAX_FIELDS:
             raise DefinitionError(f"has more than {MAX_FIELDS} fields and array elements")
-        store.register(types)
     except DefinitionError:
         raise
     except Exception:  # rosbags parses arbitrary text here: anything may go wrong
         raise DefinitionError("cannot be understood") from None
-    return store
+    return types
 
 
 def _fields(name: str, types: dict[str, Any], known: dict[str, int]) -> int:

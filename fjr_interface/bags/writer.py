@@ -5,6 +5,9 @@ The log time of a message is its header stamp, so the same content always gives 
 
 from __future__ import annotations
 
+import shutil
+import tempfile
+from collections import deque
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -38,6 +41,7 @@ from ..topics import (
     stamp_ns,
     stamps_ns,
 )
+from .files import bag_files
 from .joint_state import JointStateWriter
 from .storage import ChecksummedWriter
 
@@ -217,6 +221,40 @@ class BagWriter:
             self.close()
         else:
             self.abort()
+
+
+def keep_whole_periods(bag: Path, experiment: Experiment, samples: int) -> int:
+    """Replace a bag that ends in the middle of a realization by one of its whole periods.
+
+    Args:
+        bag: its folder, as `BagWriter` has written it with the three signals.
+        experiment: its description, with all periods that were meant to come.
+        samples: how many it holds.
+
+    Returns:
+        The number of kept periods after the transient; 0 if the bag was removed for want of one.
+    """
+    periods = samples // experiment.samples_per_period - experiment.transient_periods
+    if periods < 1:
+        shutil.rmtree(bag)
+        return 0
+    kept = experiment.model_copy(update={"periods": periods})
+    stamps = kept.stamps_ns.tolist()
+    waiting: dict[str, deque[bytes]] = {signal.absolute_topic: deque() for signal in SIGNALS}
+    with tempfile.TemporaryDirectory(prefix=".", dir=bag.parent) as scratch:
+        place = Path(scratch) / bag.name
+        with BagWriter(place, kept) as writer:
+            for block in bag_files(bag).blocks(waiting):
+                if block.topic.name in waiting:
+                    queue = waiting[block.topic.name]
+                    queue.extend(map(block.payload, range(len(block.starts))))
+                ready = min(map(len, waiting.values()))
+                for _ in range(min(ready, len(stamps) - writer.samples)):
+                    payloads = [queue.popleft() for queue in waiting.values()]
+                    writer.write(stamps[writer.samples], payloads)
+        shutil.rmtree(bag)
+        place.replace(bag)
+    return periods
 
 
 def _rows(block: np.ndarray) -> list[bytes]:

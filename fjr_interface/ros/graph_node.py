@@ -108,11 +108,24 @@ class GraphNode(Node):
             at_first: `writers` of that node when the run began.
         """
         again, now = "`fjr reset` plays the realization from its beginning", self.writers(node)
+        if twice := self._published_twice():
+            return Lack(what, f"{twice}: end all but one of them, then {again}")
         if not now:
             return Lack(what, f"{start(node)}, then {again}")
         if now - at_first:
             return Lack(what, f"the {node} was started in the middle of the run: {again}")
         return Lack(what, f"{again}; if that does not help, {start(node)} anew")
+
+    def _published_twice(self) -> str:
+        """Return which signals of the rig have several publishers, empty if none has."""
+        found = []
+        for signal in WRITERS.values():
+            infos = self.get_publishers_info_by_topic(signal.topic)
+            names = [f"{each.node_namespace.rstrip('/')}/{each.node_name}" for each in infos]
+            if len(names) > 1:
+                topic = self.resolve_topic_name(signal.topic)
+                found.append(f"{len(names)} nodes publish {topic} ({', '.join(sorted(names))})")
+        return " and ".join(found)
 
 
 def _taken(who: str, topic: str, domain: int) -> InputError:

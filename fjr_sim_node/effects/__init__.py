@@ -7,6 +7,9 @@ files, fits, documents and reports all read it. To add an effect, add its entry 
 `fx.EFFECT_PARAMETER`, in capitals, is the place of a parameter among the coefficients. What is the
 bare plant with other values (friction that a datasheet lacks) needs no kernel: `plant.with_added`.
 
+After the parameters stand three switches, one for each of these families: where none of its effects
+is on, its laws are passed over at once.
+
 An effect is off while its sizes have their defaults; then the plant is the bare one, bit for bit.
 Parameter names in files and in ROS are `effect.parameter`.
 """
@@ -15,6 +18,8 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from typing import Any
+
+import numpy as np
 
 from .drive import DRIVE, ENCODER
 from .entry import Effect, EffectParameter
@@ -49,13 +54,17 @@ NAMES: tuple[str, ...] = tuple(parameter.name for parameter in PARAMETERS)
 DEFAULTS: tuple[float, ...] = tuple(float(parameter.default) for parameter in PARAMETERS)
 
 _BY_NAME = {parameter.name: parameter for parameter in PARAMETERS}
-_PLACES = {name.upper().replace(".", "_"): place for place, name in enumerate(NAMES)}
-_SIZES = tuple(
-    NAMES.index(name)
-    for effect in CATALOGUE
-    if not effect.of_bare_plant
-    for name in effect.size_names
-)
+_FAMILIES = {"FRICTION_ON": FRICTION, "TRANSMISSION_ON": TRANSMISSION, "DRIVE_ON": DRIVE}
+_COEFFICIENTS = (*(name.upper().replace(".", "_") for name in NAMES), *_FAMILIES)
+_PLACES = {name: place for place, name in enumerate(_COEFFICIENTS)}
+
+
+def _sizes(family: Collection[Effect]) -> tuple[int, ...]:
+    return tuple(NAMES.index(name) for e in family if not e.of_bare_plant for name in e.size_names)
+
+
+_SIZES = _sizes(CATALOGUE)
+_FAMILY_SIZES = tuple(_sizes(family) for family in _FAMILIES.values())
 
 
 def __getattr__(name: str) -> int:
@@ -85,8 +94,10 @@ def contains(richer: Collection[str], simpler: Collection[str]) -> bool:
     return len(more) == len(less) == 1 and less <= set(EFFECTS[min(more)].contains)
 
 
-def coefficients(values: Mapping[str, Any]) -> tuple[float, ...] | None:
-    """Return the effects' parameters in the order of `NAMES`; None if no kernel needs them.
+def coefficients(values: Mapping[str, Any]) -> np.ndarray | None:
+    """Return the effects' parameters in the order of `NAMES`, then the switches of the families.
+
+    None if no kernel needs them.
 
     Those of effects of the bare plant are in `plant.coefficients`.
 
@@ -94,5 +105,8 @@ def coefficients(values: Mapping[str, Any]) -> tuple[float, ...] | None:
         values: checked parameter values by full name; missing ones have their defaults.
     """
     given = tuple(float(values.get(p.name, p.default)) for p in PARAMETERS)
-    on = any(given[place] != DEFAULTS[place] for place in _SIZES)
-    return given if on else None
+
+    def on(places: tuple[int, ...]) -> bool:
+        return any(given[place] != DEFAULTS[place] for place in places)
+
+    return np.array([*given, *map(on, _FAMILY_SIZES)]) if on(_SIZES) else None

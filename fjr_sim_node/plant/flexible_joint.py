@@ -20,6 +20,8 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from fjr_interface.parameters import Parameter, ParameterGroup
 from fjr_kit.compiled import jit
 
@@ -150,7 +152,7 @@ def _advance(s, torque, w, duration, p, e):
     for _ in range(substeps):
         link, motor = link_direction(s, m, w, p, e), motor_direction(s, torque, m, w, p, e)
         m = (link, motor, m[2], m[3])
-        if e is not None:
+        if e is not None and e[fx.TRANSMISSION_ON] != 0.0:
             speed = deflection_speed(s[1], s[2], s[3], e)
             region = spring_region(deflection(s[0], s[2], e), speed, e)
             m = (link, motor, flex_direction(s, torque, m, w, p, e), region)
@@ -172,7 +174,7 @@ def _rate_with_effects(speed, torque, p, e):
 
 
 def steps_per_second(
-    speed: float, torque: float, p: tuple[float, ...], e: tuple[float, ...] | None
+    speed: float, torque: float, p: tuple[float, ...], e: np.ndarray | None
 ) -> float:
     """Return how many steps a second of motion takes, at a motor speed (rad/s) and a torque (N m).
 

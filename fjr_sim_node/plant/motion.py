@@ -33,7 +33,7 @@ from .torques import (
 @inlined
 def flex_state(s, m, w, e):
     """Return the present state of the hysteresis in [-1, 1]."""
-    if e is None:
+    if e is None or e[fx.TRANSMISSION_ON] == 0.0:
         return 0.0
     if e[fx.HYSTERESIS_TORQUE_NM] == 0.0:
         return 0.0
@@ -49,7 +49,7 @@ def transmitted(s, m, w, p, e):
 @inlined
 def link_friction(s, m, w, p, e):
     """Return Coulomb friction of the link (N m): its level, or what has built up of it."""
-    if e is None:
+    if e is None or e[fx.FRICTION_ON] == 0.0:
         return p[FS] * m[0]
     level = link_level(abs(s[1]), p, e)
     if p[LINK_BRISTLES] == 0.0:
@@ -66,7 +66,7 @@ def motor_built_up(s, level, m, w, p):
 @inlined
 def motor_friction(s, te, m, w, p, e):
     """Return Coulomb friction of the motor (N m), with the damping of its bristles."""
-    if e is None:
+    if e is None or e[fx.FRICTION_ON] == 0.0:
         return p[FSM] * m[1]
     level = motor_level(abs(s[3]), m[1], s[2], te, p, e)
     if p[MOTOR_BRISTLES] == 0.0:
@@ -106,6 +106,8 @@ def derivative(s, torque, m, w, p, e):
         friction = motor_viscous(s[3], p, e) + motor_friction(s, te, m, w, p, e)
         ath = (motor_torque(s, te, torque, p, e) - friction) / p[JM]
     if e is None:
+        return s[1], aq, s[3], ath, 0.0, 0.0, 0.0
+    if e[fx.TRANSMISSION_ON] == 0.0 and e[fx.DRIVE_ON] == 0.0:
         return s[1], aq, s[3], ath, 0.0, 0.0, 0.0
     a3 = 0.0
     if e[fx.EXTRA_MODE_INERTIA_KG_M2] != 0.0:

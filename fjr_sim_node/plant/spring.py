@@ -34,7 +34,7 @@ def ripple_slope(angle, ratio, phase):
 @inlined
 def deflection(q, th, e):
     """Return the deflection of the transmission q - th (rad), with kinematic error if on."""
-    if e is None:
+    if e is None or e[fx.TRANSMISSION_ON] == 0.0:
         return q - th
     d = q - th
     if e[fx.KINEMATIC_ERROR_AMPLITUDE_RAD] != 0.0:
@@ -51,7 +51,7 @@ def spring_torque(d, p, e):
 
     Zones reduce the deflection that the spring sees; its law, cubic part included, stays.
     """
-    if e is None:
+    if e is None or e[fx.TRANSMISSION_ON] == 0.0:
         return d * (p[K0] + p[K1] * d * d)
     gap, zone = e[fx.BACKLASH_HALF_GAP_RAD], e[fx.PIECEWISE_STIFFNESS_ZONE_RAD]
     if gap != 0.0:
@@ -79,7 +79,7 @@ def spring_torque(d, p, e):
 @inlined
 def has_kinks(e):
     """Tell whether the spring's slope jumps anywhere."""
-    return (
+    return e[fx.TRANSMISSION_ON] != 0.0 and (
         e[fx.BACKLASH_HALF_GAP_RAD] != 0.0
         or e[fx.PIECEWISE_STIFFNESS_ZONE_RAD] != 0.0
         or e[fx.ASYMMETRIC_STIFFNESS_RELATIVE] != 0.0
@@ -157,7 +157,7 @@ def lever(th, e):
 
     By virtual work it is minus the derivative of the deflection by th.
     """
-    if e is None:
+    if e is None or e[fx.TRANSMISSION_ON] == 0.0:
         return 1.0
     if e[fx.KINEMATIC_ERROR_AMPLITUDE_RAD] == 0.0:
         return 1.0
@@ -173,7 +173,7 @@ def lever(th, e):
 @inlined
 def lever_slope(th, e):
     """Return the derivative of the lever by the motor angle (1/rad)."""
-    if e is None:
+    if e is None or e[fx.TRANSMISSION_ON] == 0.0:
         return 0.0
     cycles = e[fx.KINEMATIC_ERROR_CYCLES_PER_TURN]
     angle = cycles * th + e[fx.KINEMATIC_ERROR_PHASE_RAD]
@@ -187,7 +187,7 @@ def lever_slope(th, e):
 @inlined
 def deflection_speed(vq, th, vth, e):
     """Return the time derivative of the deflection (rad/s)."""
-    if e is None:
+    if e is None or e[fx.TRANSMISSION_ON] == 0.0:
         return vq - vth
     return vq - lever(th, e) * vth
 
@@ -199,11 +199,11 @@ def transmitted_torque(q, vq, th, vth, flex_level, p, e):
     `flex_level` in [-1, 1] is the state of the hysteresis.
     """
     te = spring_torque(deflection(q, th, e), p, e)
-    if e is not None:
-        if e[fx.TRANSMISSION_DAMPING_NM_S_RAD] != 0.0:
-            te += e[fx.TRANSMISSION_DAMPING_NM_S_RAD] * deflection_speed(vq, th, vth, e)
-        te += e[fx.HYSTERESIS_TORQUE_NM] * flex_level
-    return te
+    if e is None or e[fx.TRANSMISSION_ON] == 0.0:
+        return te
+    if e[fx.TRANSMISSION_DAMPING_NM_S_RAD] != 0.0:
+        te += e[fx.TRANSMISSION_DAMPING_NM_S_RAD] * deflection_speed(vq, th, vth, e)
+    return te + e[fx.HYSTERESIS_TORQUE_NM] * flex_level
 
 
 @inlined

@@ -93,56 +93,32 @@ def fastest_rate(twist, s, torque, p, e):
 
 @jit
 def _fastest_rate(stiffness, twist, decay, s, torque, p, e):
-    stiffness += p[K0] * abs(e[fx.ASYMMETRIC_STIFFNESS_RELATIVE])
-    te = stiffness * twist
-    if e[fx.HYSTERESIS_TORQUE_NM] != 0.0:
-        stiffness += e[fx.HYSTERESIS_TORQUE_NM] / e[fx.HYSTERESIS_DISPLACEMENT_RAD]
-    cycles = e[fx.KINEMATIC_ERROR_CYCLES_PER_TURN]
-    slope = (
-        e[fx.KINEMATIC_ERROR_AMPLITUDE_RAD]
-        * cycles
-        * (1.0 + 2.0 * e[fx.KINEMATIC_ERROR_SECOND_RATIO])
-    )
-    bend = (
-        e[fx.KINEMATIC_ERROR_AMPLITUDE_RAD]
-        * cycles
-        * cycles
-        * (1.0 + 4.0 * e[fx.KINEMATIC_ERROR_SECOND_RATIO])
-    )
-    ratio = 1.0 + slope
-    mobility = 1.0 / p[J] + ratio * (ratio + load_coefficient(e)) / p[JM]
     link, motor = p[LINK_BRISTLES], p[MOTOR_BRISTLES]
-    if is_rigid(p):
-        motor += e[fx.GRAVITY_TORQUE_NM]
-    else:
-        link += e[fx.GRAVITY_TORQUE_NM]
-    motor += (
-        e[fx.COGGING_AMPLITUDE_NM]
-        * e[fx.COGGING_CYCLES_PER_TURN]
-        * (1.0 + 2.0 * e[fx.COGGING_SECOND_RATIO])
-        + te * bend
-    )
-    friction = e[fx.POSITION_FRICTION_AMPLITUDE_NM] * e[fx.POSITION_FRICTION_CYCLES_PER_TURN]
-    motor += friction * (1.0 + 2.0 * e[fx.POSITION_FRICTION_SECOND_RATIO])
-    decay += e[fx.TRANSMISSION_DAMPING_NM_S_RAD] * mobility
-    decay += e[fx.STRIBECK_FRICTION_LINK_TORQUE_NM] / (
-        e[fx.STRIBECK_FRICTION_LINK_VELOCITY_RAD_S] * p[J]
-    )
-    decay += e[fx.STRIBECK_FRICTION_MOTOR_TORQUE_NM] / (
-        e[fx.STRIBECK_FRICTION_MOTOR_VELOCITY_RAD_S] * p[JM]
-    )
-    decay += e[fx.LUGRE_FRICTION_STRIBECK_NM] / (e[fx.LUGRE_FRICTION_VELOCITY_RAD_S] * p[JM])
-    if e[fx.LUGRE_FRICTION_BRISTLE_NM_RAD] != math.inf:
-        # sigma1 exp(-u^2) (1 - F / L) v: |1 - F / L| <= 2, and L falls as fast as sigma1 does
-        decay += 3.0 * e[fx.LUGRE_FRICTION_DAMPING_NM_S_RAD] / p[JM]
-    decay += _decay_at_limit(s, torque, e) / p[JM]
-    decay += 2.0 * e[fx.QUADRATIC_FRICTION_LINK_NM_S2_RAD2] * abs(s[1]) / p[J]
-    decay += (
-        2.0 * e[fx.QUADRATIC_FRICTION_MOTOR_NM_S2_RAD2] * abs(s[3])
-        + abs(e[fx.ASYMMETRIC_FRICTION_VISCOUS_NM_S_RAD])
-    ) / p[JM]
-    squared = stiffness * mobility + link / p[J] + motor / p[JM]
-    rate = max(math.sqrt(squared) + decay, 0.3 * ripple_rate(s[3], e))
+    mobility = 1.0 / p[J] + 1.0 / p[JM]
+    if e[fx.TRANSMISSION_ON] != 0.0:
+        stiffness += p[K0] * abs(e[fx.ASYMMETRIC_STIFFNESS_RELATIVE])
+        ratio, bend = _kinematic_bounds(e)
+        motor += stiffness * twist * bend
+        if e[fx.HYSTERESIS_TORQUE_NM] != 0.0:
+            stiffness += e[fx.HYSTERESIS_TORQUE_NM] / e[fx.HYSTERESIS_DISPLACEMENT_RAD]
+        mobility = 1.0 / p[J] + ratio * (ratio + load_coefficient(e)) / p[JM]
+        decay += e[fx.TRANSMISSION_DAMPING_NM_S_RAD] * mobility
+        if is_rigid(p):
+            motor += e[fx.GRAVITY_TORQUE_NM]
+        else:
+            link += e[fx.GRAVITY_TORQUE_NM]
+    elif e[fx.FRICTION_ON] != 0.0:
+        mobility += load_coefficient(e) / p[JM]
+    if e[fx.FRICTION_ON] != 0.0:
+        friction = e[fx.POSITION_FRICTION_AMPLITUDE_NM] * e[fx.POSITION_FRICTION_CYCLES_PER_TURN]
+        motor += friction * (1.0 + 2.0 * e[fx.POSITION_FRICTION_SECOND_RATIO])
+        decay += _decay_by_friction(s, p, e)
+    if e[fx.DRIVE_ON] != 0.0:
+        cogging = e[fx.COGGING_AMPLITUDE_NM] * e[fx.COGGING_CYCLES_PER_TURN]
+        motor += cogging * (1.0 + 2.0 * e[fx.COGGING_SECOND_RATIO])
+        decay += _decay_at_limit(s, torque, e) / p[JM]
+    rate = math.sqrt(stiffness * mobility + link / p[J] + motor / p[JM]) + decay
+    rate = max(rate, 0.3 * ripple_rate(s[3], e))
     if e[fx.EXTRA_MODE_INERTIA_KG_M2] != 0.0:
         share = 1.0 + e[fx.EXTRA_MODE_INERTIA_KG_M2] / p[J]
         factor = max(math.sqrt(share), 2.0 * e[fx.EXTRA_MODE_DAMPING_RATIO] * share)
@@ -150,6 +126,29 @@ def _fastest_rate(stiffness, twist, decay, s, torque, p, e):
     if e[fx.ACTUATOR_LAG_TIME_CONSTANT_S] != 0.0:
         rate = max(rate, 0.2 / e[fx.ACTUATOR_LAG_TIME_CONSTANT_S])
     return rate
+
+
+@inlined
+def _kinematic_bounds(e):
+    """Return the greatest lever of a kinematic error, and its greatest slope by the angle."""
+    cycles, second = e[fx.KINEMATIC_ERROR_CYCLES_PER_TURN], e[fx.KINEMATIC_ERROR_SECOND_RATIO]
+    slope = e[fx.KINEMATIC_ERROR_AMPLITUDE_RAD] * cycles
+    return 1.0 + slope * (1.0 + 2.0 * second), slope * cycles * (1.0 + 4.0 * second)
+
+
+@inlined
+def _decay_by_friction(s, p, e):
+    """Return how fast friction that falls or grows with speed may damp or drive a side (1/s)."""
+    link = 2.0 * e[fx.QUADRATIC_FRICTION_LINK_NM_S2_RAD2] * abs(s[1])
+    link += e[fx.STRIBECK_FRICTION_LINK_TORQUE_NM] / e[fx.STRIBECK_FRICTION_LINK_VELOCITY_RAD_S]
+    motor = 2.0 * e[fx.QUADRATIC_FRICTION_MOTOR_NM_S2_RAD2] * abs(s[3])
+    motor += abs(e[fx.ASYMMETRIC_FRICTION_VISCOUS_NM_S_RAD])
+    motor += e[fx.STRIBECK_FRICTION_MOTOR_TORQUE_NM] / e[fx.STRIBECK_FRICTION_MOTOR_VELOCITY_RAD_S]
+    motor += e[fx.LUGRE_FRICTION_STRIBECK_NM] / e[fx.LUGRE_FRICTION_VELOCITY_RAD_S]
+    if e[fx.LUGRE_FRICTION_BRISTLE_NM_RAD] != math.inf:
+        # sigma1 exp(-u^2) (1 - F / L) v: |1 - F / L| <= 2, and L falls as fast as sigma1 does
+        motor += 3.0 * e[fx.LUGRE_FRICTION_DAMPING_NM_S_RAD]
+    return link / p[J] + motor / p[JM]
 
 
 @inlined

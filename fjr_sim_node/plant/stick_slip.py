@@ -213,7 +213,7 @@ def _stopped(s, link, motor):
 @inlined
 def remembered(s, m, w, p, e):
     """Return w with what has built up until now, counted from here on; `facing` completes it."""
-    if e is None:
+    if e is None or (e[fx.FRICTION_ON] == 0.0 and e[fx.TRANSMISSION_ON] == 0.0):
         return w
     link, motor = 0.0, 0.0
     if p[LINK_BRISTLES] != 0.0:
@@ -228,7 +228,7 @@ def remembered(s, m, w, p, e):
 @inlined
 def facing(s, m, w, p, e):
     """Return w with the levels of presliding friction in the directions that now begin."""
-    if e is None:
+    if e is None or e[fx.FRICTION_ON] == 0.0:
         return w
     link, motor = 0.0, 0.0
     if p[LINK_BRISTLES] != 0.0:
@@ -256,7 +256,7 @@ def advance_smoothly(s, torque, m, w, h, p, e):
             return s, m, w
         s1 = runge_kutta(s, torque, m, w, h, p, e)
         first, time = -1, h
-        for which in range(2 if e is None else 4):
+        for which in range(2 if e is None or e[fx.TRANSMISSION_ON] == 0.0 else 4):
             value = _margin(which, s1, torque, m, w, p, e)
             if value < 0.0:
                 event_time = _event_time(which, s, torque, m, w, h, value, p, e)

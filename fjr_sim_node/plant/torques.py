@@ -18,7 +18,7 @@ from .spring import lever, ripple
 @inlined
 def link_level(speed, p, e):
     """Return the Coulomb level of the link (N m) at a slip speed >= 0, 0 being breakaway."""
-    if e is None:
+    if e is None or e[fx.FRICTION_ON] == 0.0:
         return p[FS]
     level = p[FS]
     if e[fx.STRIBECK_FRICTION_LINK_TORQUE_NM] != 0.0:
@@ -30,7 +30,7 @@ def link_level(speed, p, e):
 @inlined
 def motor_level(speed, direction, th, te, p, e):
     """Return the Coulomb level of the motor (N m) in a slip direction; never below zero."""
-    if e is None:
+    if e is None or e[fx.FRICTION_ON] == 0.0:
         return p[FSM]
     level = p[FSM]
     if e[fx.STRIBECK_FRICTION_MOTOR_TORQUE_NM] != 0.0:
@@ -73,7 +73,7 @@ def load_coefficient(e):
 @inlined
 def motor_has_coulomb(p, e):
     """Tell whether the motor can have a Coulomb level at any angle, load or direction."""
-    if e is None:
+    if e is None or e[fx.FRICTION_ON] == 0.0:
         return p[FSM] != 0.0
     return (
         p[FSM] != 0.0
@@ -88,7 +88,7 @@ def motor_has_coulomb(p, e):
 @inlined
 def link_drive(q, vq, te, q3, v3, p, e):
     """Return the torque that drives the link against its friction (N m)."""
-    if e is None:
+    if e is None or e[fx.TRANSMISSION_ON] == 0.0:
         return -te
     drive = -te
     if e[fx.GRAVITY_TORQUE_NM] != 0.0:
@@ -125,20 +125,31 @@ def torque_ripple(th, e):
 
 
 @inlined
-def motor_drive(th, vth, te, torque, p, e):
-    """Return the torque that drives the motor against its friction (N m)."""
-    if e is None:
-        return torque + te
+def driven(th, vth, torque, e):
+    """Return what the drive makes of a torque at a motor angle and speed (N m), with cogging."""
     drive = available(torque, vth, e)
     if e[fx.TORQUE_CONSTANT_RIPPLE_AMPLITUDE] != 0.0:
         drive *= 1.0 + torque_ripple(th, e)
-    drive += te * lever(th, e)
     drive += e[fx.TORQUE_BIAS_TORQUE_NM]
     if e[fx.COGGING_AMPLITUDE_NM] != 0.0:
         angle = e[fx.COGGING_CYCLES_PER_TURN] * th + e[fx.COGGING_PHASE_RAD]
         drive += e[fx.COGGING_AMPLITUDE_NM] * ripple(
             angle, e[fx.COGGING_SECOND_RATIO], e[fx.COGGING_SECOND_PHASE_RAD]
         )
+    return drive
+
+
+@inlined
+def motor_drive(th, vth, te, torque, p, e):
+    """Return the torque that drives the motor against its friction (N m)."""
+    if e is None:
+        return torque + te
+    drive = torque
+    if e[fx.DRIVE_ON] != 0.0:
+        drive = driven(th, vth, torque, e)
+    if e[fx.TRANSMISSION_ON] == 0.0:
+        return drive + te
+    drive += te * lever(th, e)
     if e[fx.GRAVITY_TORQUE_NM] != 0.0 and is_rigid(p):
         drive -= e[fx.GRAVITY_TORQUE_NM] * math.sin(th + e[fx.GRAVITY_ANGLE_RAD])
     return drive
@@ -147,7 +158,7 @@ def motor_drive(th, vth, te, torque, p, e):
 @inlined
 def link_viscous(v, p, e):
     """Return velocity-dependent friction of the link beyond Coulomb's (N m)."""
-    if e is None:
+    if e is None or e[fx.FRICTION_ON] == 0.0:
         return p[FV] * v
     return p[FV] * v + e[fx.QUADRATIC_FRICTION_LINK_NM_S2_RAD2] * abs(v) * v
 
@@ -155,7 +166,7 @@ def link_viscous(v, p, e):
 @inlined
 def motor_viscous(v, p, e):
     """Return velocity-dependent friction of the motor beyond Coulomb's (N m)."""
-    if e is None:
+    if e is None or e[fx.FRICTION_ON] == 0.0:
         return p[FVM] * v
     return p[FVM] * v + (
         e[fx.QUADRATIC_FRICTION_MOTOR_NM_S2_RAD2] * v + e[fx.ASYMMETRIC_FRICTION_VISCOUS_NM_S_RAD]

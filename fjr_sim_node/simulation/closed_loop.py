@@ -72,7 +72,7 @@ def simulate(
     plant_coefficients: tuple[float, ...],
     controller: Law,
     noise: np.ndarray | None = None,
-    effects: tuple[float, ...] | None = None,
+    effects: np.ndarray | None = None,
     elapsed_s: float = 0.0,
 ) -> Trajectory:
     """Simulate the closed loop from rest.
@@ -116,7 +116,7 @@ def simulate_law(
     plant_coefficients: tuple[float, ...],
     controller: TransferFunction,
     noise: np.ndarray | None = None,
-    effects: tuple[float, ...] | None = None,
+    effects: np.ndarray | None = None,
     elapsed_s: float = 0.0,
     *,
     added_torque: np.ndarray | None = None,

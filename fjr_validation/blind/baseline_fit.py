@@ -1,54 +1,130 @@
-"""Parts that the plain baselines share: line residuals, their noise, a damped Gauss-Newton fit."""
+"""What the compared methods share: one problem for all worlds, its gaps, a Gauss-Newton fit.
+
+Runs are played whole, from their true start. One division serves all methods, that of
+`Evidence`: some parts of the runs are fitted, others choose, others report.
+"""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from fjr_records.periodic import read_experiment
-from fjr_records.spectra import line_spectrum
-from gap_diagnosis.model.simulated_rig import Model, Simulator
-from gap_diagnosis.outcome.diagnosis import Gap
-from gap_diagnosis.which.search_space import Scales
+from fjr_records.periodic import RecordedExperiment
+from gap_diagnosis.any_record import read_any
+from gap_diagnosis.model.evidence import Evidence, Purpose
+from gap_diagnosis.model.simulated_rig import Model
+from gap_diagnosis.outcome.diagnosis import (
+    Cause,
+    Diagnosis,
+    Estimate,
+    EvidenceKind,
+    Gap,
+    Gaps,
+    Stage,
+    Step,
+    Verdict,
+)
+from gap_diagnosis.which.scales import Scales
 
-_REPEATABILITY = 1e-3
-_NEIGHBOURS = 10
+BUDGET_S = 120.0
+"""Time of one method for one case; what is begun then is ended (a simulation, not a fit)."""
+
+MATTERS = 0.1
+"""The methods of others name nothing. What one has fitted is named if the error on the validation
+parts grows by this share once that value is put back to the datasheet's."""
+
 _STEP = 2e-3
+
+Positions = Mapping[int, np.ndarray]
+"""Simulated y of some runs, (samples,) in rad, by the index of the run."""
 
 
 class Problem:
-    """A recorded experiment to be met by a model, line by line, on all realizations.
+    """Recorded runs to be met by a model.
 
     Attributes:
-        nominal: nominal bare parameters.
-        equations: how many real residuals there are.
+        budget_s: time for all of it.
+        nominal: nominal bare parameters; those of one body on a rigid axis.
+        evidence: the runs, cut and divided.
         scales: what is usual in the record.
+        fitted: names of the bare parameters that a refit may change; what the datasheet puts at
+            zero stays there.
     """
 
     def __init__(self, folder: Path, nominal: Mapping[str, float]) -> None:
-        """Read the bags; each line's noise is that of its neighbours, plus 0.1 % of the signal."""
-        self.nominal = {name: float(value) for name, value in nominal.items()}
-        recorded = read_experiment(folder)
-        self._simulator = Simulator(recorded)
-        self._lines = recorded.lines
-        spectra = [r.spectrum(r.position, self._lines) for r in recorded.realizations]
-        self._measured = np.array([s.mean(0) for s in spectra])
-        self.scales = Scales.of_experiment(recorded, self.nominal)
-        self._rms = np.array([np.std(r.kept(r.position)) for r in recorded.realizations])
-        self._sigma = np.array([_line_sigma(s) for s in spectra])
-        self.equations = 2 * self._measured.size
+        """Read the bags, whatever they hold; the budget begins."""
+        self.budget_s = BUDGET_S
+        self._until = time.monotonic() + self.budget_s
+        self.nominal = dict(Model.nominal(nominal).plant)
+        self.fitted = tuple(name for name, value in self.nominal.items() if value)
+        recorded = read_any(folder)
+        self._periodic = isinstance(recorded, RecordedExperiment)
+        records = recorded.as_records() if isinstance(recorded, RecordedExperiment) else recorded
+        self.evidence = Evidence(records, nominal)
+        self.scales = Scales.of_record(
+            [r.position for r in records.records],
+            [r.torque for r in records.records],
+            records.sample_rate_hz,
+            self.evidence.lines * self.evidence.line_hz,
+            self.nominal,
+        )
+        self._fit = self.evidence.parts_for("fit")
+        cell = self.evidence.cell_of(self._fit)
+        self._sigma = np.sqrt(self.evidence.floor(self._fit))[cell]
+        self.equations = self._sigma.size
 
-    def residual(self, values: Mapping[str, float]) -> np.ndarray:
-        """Return (measured - simulated)/sigma of all lines as reals; inf if the motion diverges."""
-        model = Model(
+    @property
+    def seconds_left(self) -> float:
+        """How much of the budget is left (s)."""
+        return max(self._until - time.monotonic(), 0.0)
+
+    @property
+    def sample_rate_hz(self) -> float:
+        """Rate of the samples."""
+        return self.evidence.records.sample_rate_hz
+
+    def model(self, values: Mapping[str, float]) -> Model:
+        """Return the model of bare and effect parameters by name."""
+        return Model(
             {name: values[name] for name in self.nominal},
             {name: value for name, value in values.items() if name not in self.nominal},
         )
-        difference = self._measured - line_spectrum(self._simulator.signals(model)[0], self._lines)
-        parts = np.concatenate([difference.real / self._sigma, difference.imag / self._sigma])
-        return np.where(np.isfinite(parts), parts, np.inf).ravel() * np.sqrt(2.0)
+
+    def residual(self, values: Mapping[str, float]) -> np.ndarray:
+        """Return the errors of the fitted parts over their noise and 0.1 % of the motion there."""
+        errors = self.evidence.errors([self.model(values)], self._fit)[0] / self._sigma
+        return np.where(np.isfinite(errors), errors, np.inf)
+
+    def runs(self, *purposes: Purpose) -> list[int]:
+        """Return the indices of the runs that hold parts for some purposes."""
+        return sorted({self.evidence.parts[i].record for i in self._parts(purposes)})
+
+    def play(self, values: Mapping[str, float], which: Sequence[int]) -> Positions:
+        """Return the positions of the simulated rig."""
+        runs = self.evidence.simulator.run([self.model(values)], which)[0]
+        return {index: run[0] for index, run in zip(which, runs, strict=True)}
+
+    def error(self, positions: Positions, *purposes: Purpose) -> np.ndarray:
+        """Return simulated less recorded position on the samples for some purposes (rad)."""
+        runs, records = self.runs(*purposes), self.evidence.records.records
+        kept = {index: self.samples(index, *purposes) for index in runs}
+        return np.concatenate([(positions[i] - records[i].position)[kept[i]] for i in runs])
+
+    def samples(self, index: int, *purposes: Purpose) -> np.ndarray:
+        """Return which samples of a run serve some purposes, bool (samples,)."""
+        hop, parts = self.evidence.hop, self.evidence.parts
+        kept = np.zeros(self.evidence.records.records[index].samples, bool)
+        for part in (parts[i] for i in self._parts(purposes)):
+            if part.record == index:
+                kept[part.windows.start * hop : part.windows.stop * hop] = True
+        return kept
+
+    def _parts(self, purposes: Sequence[Purpose]) -> tuple[int, ...]:
+        """Return the parts for some purposes; all if there are none for them."""
+        return self.evidence.parts_for(*purposes) or tuple(range(len(self.evidence.parts)))
 
     def within(self, name: str, value: float) -> float:
         """Return the value of a parameter within its range; bare parameters stay positive."""
@@ -58,25 +134,85 @@ class Problem:
             low = self.scales.negligible(name) or low
         return float(np.clip(value, low, high))
 
-    def gap(self, residual: np.ndarray) -> Gap:
-        """Return the gap that a residual leaves, on the data of the fit."""
-        real, imag = np.split(residual.reshape(2 * len(self._rms), -1) / np.sqrt(2.0), 2)
-        power = np.sum((real**2 + imag**2) * self._sigma**2, axis=1) / 2.0
+    def gap(self, positions: Positions) -> Gap:
+        """Return the gap on what nothing was fitted to: rms error over rms motion, each part's."""
+        evidence, shares = self.evidence, []
+        for i in evidence.reporting:
+            part = evidence.parts[i]
+            motion = evidence.records.records[part.record].position
+            error = evidence.lines_of(positions[part.record], part.record)[part.windows]
+            power = np.sum(error**2) / (evidence.windows(i) * evidence.hop)
+            shares.append(power / max(float(np.var(motion)), 1e-300))
         return Gap(
-            nrmse_position=float(np.sqrt(np.mean(power / self._rms**2))),
-            nrmse_torque=None,
-            chi2_per_dof=float(np.mean(residual**2)),
+            nrmse_position=float(np.sqrt(np.mean(shares))), nrmse_torque=None, chi2_per_dof=None
         )
 
+    def gap_of(self, values: Mapping[str, float]) -> Gap:
+        """Return the gap of the simulated rig with some values."""
+        return self.gap(self.play(values, self.reported))
 
-def _line_sigma(spectra: np.ndarray) -> np.ndarray:
-    """Return the standard deviation of each line of the mean over periods, float64 (lines,)."""
-    periods = spectra.shape[0]
-    noise = np.var(spectra, axis=0, ddof=1) if periods > 1 else np.zeros(spectra.shape[1])
-    window = np.ones(2 * _NEIGHBOURS + 1)
-    smooth = np.convolve(noise, window, "same") / np.convolve(np.ones(noise.size), window, "same")
-    signal = np.mean(np.abs(spectra.mean(0)) ** 2)
-    return np.sqrt(smooth / periods + _REPEATABILITY**2 * signal)
+    @property
+    def reported(self) -> list[int]:
+        """The runs that report."""
+        return sorted({self.evidence.parts[i].record for i in self.evidence.reporting})
+
+    def kind(self) -> EvidenceKind:
+        """Return what a verdict rests on."""
+        shared = set(self.reported) & set(self.runs("fit"))
+        return EvidenceKind(
+            noise=self.evidence.noise.source,
+            reported_on="none" if not self.evidence.parts_for("report")
+            else "blocks" if shared else "records",
+            controller=self.evidence.simulator.loop.kind,
+            excitation="periodic" if self._periodic else "record",
+        )  # fmt: skip
+
+
+def verdict_of(
+    problem: Problem,
+    gaps: Mapping[Stage, Gap],
+    values: Mapping[str, float],
+    present: Mapping[str, float],
+    without_effect: Verdict = "parameters_only",
+    notes: Sequence[str] = (),
+) -> Diagnosis:
+    """Return the verdict of a method that knows no intervals.
+
+    Args:
+        problem: what was met.
+        gaps: by stage, as far as it went.
+        values: what was fitted, by name.
+        present: the named effects, each with how surely it is said to be there.
+        without_effect: what is said if none is named.
+        notes: what a reader must see.
+    """
+    names = list(present)
+    return Diagnosis(
+        verdict="effect" if names else without_effect,
+        effects=names,
+        equivalent=[[name] for name in names],
+        confidence=min(present.values(), default=1.0),
+        evidence=problem.kind(),
+        causes=[Cause(effect=name, present=sure) for name, sure in present.items()],
+        steps=[
+            Step(
+                added=" + ".join(names) if stage == "cause" else None,
+                stage=stage,
+                nrmse_position=gap.nrmse_position,
+                nrmse_torque=None,
+                chi2_per_dof=None,
+            )
+            for stage, gap in gaps.items()
+        ],
+        gap=Gaps(
+            nominal=gaps.get("nominal"),
+            refit=gaps.get("refit"),
+            explained=gaps.get("cause"),
+            noise_floor=None,
+        ),
+        parameters={n: Estimate(value=v, low=np.nan, high=np.nan) for n, v in values.items()},
+        notes=list(notes),
+    )
 
 
 def jacobian(
@@ -96,28 +232,22 @@ def scale(name: str, values: Mapping[str, float]) -> float:
 
 
 def fit(
-    problem: Problem,
-    start: Mapping[str, float],
-    free: Sequence[str],
-    iterations: int = 8,
-    jacobian_at_start: np.ndarray | None = None,
+    problem: Problem, start: Mapping[str, float], free: Sequence[str], iterations: int = 8
 ) -> tuple[dict[str, float], np.ndarray]:
     """Return fitted values and their residual: Levenberg-Marquardt within the parameters' ranges.
 
     Args:
-        problem: what to meet.
+        problem: what to meet; no step is begun after its budget.
         start: all values.
         free: the names that may change.
         iterations: most steps accepted.
-        jacobian_at_start: columns that are known already, those of the first names in `free`.
     """
     values, residual = dict(start), problem.residual(start)
-    damping, known = 1e-3, jacobian_at_start
+    damping = 1e-3
     for _ in range(iterations):
-        missing = free if known is None else free[known.shape[1] :]
-        fresh = jacobian(problem, values, missing, residual)
-        matrix = fresh if known is None else np.hstack([known, fresh])
-        known = None
+        if not problem.seconds_left:
+            break
+        matrix = jacobian(problem, values, free, residual)
         if not np.isfinite(matrix).all():
             break
         better = _step(problem, values, residual, free, matrix, damping)

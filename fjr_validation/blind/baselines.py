@@ -9,35 +9,24 @@ sparse   sequentially thresholded least squares (Brunton et al. 2016) of what th
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from fjr_sim_node import effects as fx
-from gap_diagnosis.outcome.diagnosis import (
-    Candidate,
-    Diagnosis,
-    Estimate,
-    EvidenceKind,
-    Gaps,
-    Verdict,
-)
+from gap_diagnosis.outcome.diagnosis import Diagnosis, Gap, Stage, Verdict
 from gap_diagnosis.which.catalogue import catalogue
 from gap_diagnosis.which.search_space import starts
 
-from .baseline_fit import Problem, fit, jacobian
-
-NOTHING_HELD_OUT = EvidenceKind(
-    noise="repeats", reported_on="none", controller="known", excitation="periodic"
-)
+from .baseline_fit import Problem, fit, jacobian, verdict_of
 
 _UNDETECTED = 1.5  # chi2 per equation below which there is nothing left to explain
 _STEPS_OF_EFFECT = 3
 _MOST_NAMED = 3
 _MOST_FITTED = 4  # effects that `bic` fits: those whose linear gain is greatest
-_CYCLES = tuple(float(round(c)) for c in np.geomspace(3.0, 180.0, 16))
+_FOR_FITS = 0.5  # of the budget
 _ANGLES = ("phase_rad", "angle_rad")
 
 
@@ -49,11 +38,9 @@ class _Refit:
     before: np.ndarray
 
     @property
-    def gaps(self) -> Gaps:
-        gap = self.problem.gap
-        return Gaps(
-            nominal=gap(self.before), refit=gap(self.residual), explained=None, noise_floor=None
-        )
+    def gaps(self) -> dict[Stage, Gap]:
+        gap = self.problem.gap_of
+        return {"nominal": gap(self.problem.nominal), "refit": gap(self.values)}
 
     @property
     def without_effect(self) -> Verdict:
@@ -63,26 +50,16 @@ class _Refit:
 def _refitted(folder: Path, nominal: Mapping[str, float]) -> _Refit:
     problem = Problem(folder, nominal)
     before = problem.residual(problem.nominal)
-    values, residual = fit(problem, problem.nominal, tuple(problem.nominal))
+    values, residual = fit(problem, problem.nominal, problem.fitted)
     return _Refit(problem, values, residual, before)
-
-
-def _estimates(values: Mapping[str, float]) -> dict[str, Estimate]:
-    """Return the values with no interval: these baselines have none."""
-    return {name: Estimate(value=v, low=v, high=v) for name, v in values.items()}
 
 
 def refit_only(folder: Path, nominal: Mapping[str, float]) -> Diagnosis:
     """Diagnose by the parameter fit alone: good enough, or unexplained."""
     refit = _refitted(folder, nominal)
     explained = np.mean(refit.residual**2) < _UNDETECTED
-    return Diagnosis(
-        verdict=refit.without_effect if explained else "unexplained",
-        confidence=1.0,
-        evidence=NOTHING_HELD_OUT,
-        gap=refit.gaps,
-        parameters=_estimates(refit.values),
-    )
+    found = refit.without_effect if explained else "unexplained"
+    return verdict_of(refit.problem, refit.gaps, refit.values, {}, found)
 
 
 def _projected(basis: np.ndarray, vector: np.ndarray) -> np.ndarray:
@@ -90,13 +67,20 @@ def _projected(basis: np.ndarray, vector: np.ndarray) -> np.ndarray:
 
 
 def _features(refit: _Refit, basis: np.ndarray) -> list[tuple[str, dict[str, float], np.ndarray]]:
-    """Return (effect, values, change of the residual beyond any refit) of every starting point."""
+    """Return (effect, values, change of the residual beyond any refit) of the starting points.
+
+    All effects have their first start tried before any has its second, for half of the budget.
+    """
     found = []
-    nominal = refit.problem.nominal
-    for effect in catalogue(nominal):
-        cycles = _CYCLES if fx.EFFECTS[effect].ripple else None
-        for point in starts(effect, refit.problem.scales, cycles, nominal):
-            residual = refit.problem.residual({**refit.values, **point})
+    problem = refit.problem
+    points = {
+        e: starts(e, problem.scales, None, problem.nominal) for e in catalogue(problem.nominal)
+    }
+    for row in itertools.zip_longest(*points.values()):
+        for effect, point in zip(points, row, strict=True):
+            if point is None or problem.seconds_left < _FOR_FITS * problem.budget_s:
+                continue
+            residual = problem.residual({**refit.values, **point})
             if np.isfinite(residual).all():
                 found.append((effect, point, _projected(basis, residual - refit.residual)))
     return found
@@ -112,7 +96,7 @@ def _gain(feature: np.ndarray, left: np.ndarray) -> float:
 def lowest_bic(folder: Path, nominal: Mapping[str, float]) -> Diagnosis:
     """Diagnose by the lowest BIC over the bare plant and every single effect."""
     refit = _refitted(folder, nominal)
-    bare = tuple(nominal)
+    bare = refit.problem.fitted
     slopes = jacobian(refit.problem, refit.values, bare, refit.residual)
     basis = np.linalg.qr(slopes)[0]
     left = _projected(basis, refit.residual)
@@ -138,31 +122,17 @@ def lowest_bic(folder: Path, nominal: Mapping[str, float]) -> Diagnosis:
 def _bic_verdict(refit: _Refit, outcomes: list[tuple[float, str, dict[str, float]]]) -> Diagnosis:
     best, effect, values = outcomes[0]
     weights = np.exp(-0.5 * (np.array([bic for bic, _, _ in outcomes]) - best))
-    return Diagnosis(
-        verdict="effect" if effect else refit.without_effect,
-        effects=[effect] if effect else [],
-        equivalent=[[effect]] if effect else [],
-        confidence=float(1.0 / weights.sum()),
-        evidence=NOTHING_HELD_OUT,
-        gap=refit.gaps,
-        ranking=[
-            Candidate(
-                effects=[name] if name else [],
-                held_out_chi2=None,
-                delta=float(bic - best),
-                converged=True,
-                parameters=_estimates(fitted),
-            )
-            for bic, name, fitted in outcomes
-        ],
-        parameters=_estimates(values),
-    )
+    present = {effect: float(1.0 / weights.sum())} if effect else {}
+    gaps = refit.gaps
+    if effect:
+        gaps["cause"] = refit.problem.gap_of(values)
+    return verdict_of(refit.problem, gaps, values, present, refit.without_effect)
 
 
 def sparse_regression(folder: Path, nominal: Mapping[str, float]) -> Diagnosis:
     """Diagnose by the few features that explain what the refit leaves."""
     refit = _refitted(folder, nominal)
-    slopes = jacobian(refit.problem, refit.values, tuple(nominal), refit.residual)
+    slopes = jacobian(refit.problem, refit.values, refit.problem.fitted, refit.residual)
     basis = np.linalg.qr(slopes)[0]
     left = _projected(basis, refit.residual)
     features = [f for f in _features(refit, basis) if np.linalg.norm(f[2]) > 1e-9]
@@ -180,15 +150,9 @@ def sparse_regression(folder: Path, nominal: Mapping[str, float]) -> Diagnosis:
     strength = columns.T @ -left
     order = sorted(chosen.tolist(), key=lambda index: -strength[index])
     names = list(dict.fromkeys(features[index][0] for index in order))[:_MOST_NAMED]
-    return Diagnosis(
-        verdict="effect" if names else refit.without_effect,
-        effects=names,
-        equivalent=[[name] for name in names],
-        confidence=float(np.clip(1.0 - best / (left @ left), 0.0, 1.0)) if names else 1.0,
-        evidence=NOTHING_HELD_OUT,
-        gap=refit.gaps,
-        parameters=_estimates(refit.values),
-    )
+    sure = float(np.clip(1.0 - best / (left @ left), 0.0, 1.0))
+    present = dict.fromkeys(names, sure)
+    return verdict_of(refit.problem, refit.gaps, refit.values, present, refit.without_effect)
 
 
 def _thresholded(columns: np.ndarray, target: np.ndarray, threshold: float) -> np.ndarray:
@@ -201,7 +165,3 @@ def _thresholded(columns: np.ndarray, target: np.ndarray, threshold: float) -> n
             return kept
         kept = kept[stays]
     return kept
-
-
-BASELINES = {"refit": refit_only, "bic": lowest_bic, "sparse": sparse_regression}
-"""The baselines by name."""

@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -22,9 +23,19 @@ METHODS: Mapping[str, tuple[str, str]] = {
     "refit": ("fjr_validation.blind.baselines", "refit_only"),
     "bic": ("fjr_validation.blind.baselines", "lowest_bic"),
     "sparse": ("fjr_validation.blind.baselines", "sparse_regression"),
+    "bam": ("fjr_validation.blind.bam", "bam"),
+    "pace": ("fjr_validation.blind.pace", "pace"),
+    "mujoco": ("fjr_validation.blind.mujoco_sysid", "mujoco_sysid"),
 }
 """Module and function of each method by name, the project's own first. A function takes the folder
 of bags and the datasheet."""
+
+NEEDED: Mapping[str, tuple[str, ...]] = {
+    "bam": ("cma",),
+    "pace": ("cma",),
+    "mujoco": ("mujoco.sysid", "absl", "colorama", "tabulate", "yaml"),
+}
+"""Libraries of the extra `rivals` that methods load."""
 
 KEPT = (
     "verdict", "effects", "equivalent", "confidence", "reported_on", "causes", "steps", "remainder",
@@ -35,10 +46,23 @@ _DIGITS = 6
 
 
 def check_methods(names: Sequence[str]) -> None:
-    """Raise InputError for a method that does not exist."""
-    unknown = [name for name in names if name not in METHODS]
-    if unknown:
-        raise InputError(f"There is no method {unknown[0]!r}; known are {', '.join(METHODS)}.")
+    """Raise InputError for a method that does not exist, or whose libraries are not installed."""
+    for name in names:
+        if name not in METHODS:
+            raise InputError(f"There is no method {name!r}; known are {', '.join(METHODS)}.")
+        absent = [library for library in NEEDED.get(name, ()) if not _installed(library)]
+        if absent:
+            raise InputError(
+                f"The method {name} needs {' and '.join(absent)}, not installed here; install "
+                "fjr-rig[rivals]."
+            )
+
+
+def _installed(library: str) -> bool:
+    try:
+        return find_spec(library) is not None
+    except ImportError:  # of the package that it is a part of
+        return False
 
 
 def verdicts(case: str, folder: Path, methods: Sequence[str]) -> list[dict[str, Any]]:

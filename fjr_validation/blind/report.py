@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 from fjr_kit.atomic import write_whole
 from fjr_kit.errors import InputError
@@ -15,6 +16,7 @@ from .check import BlindCheck, Unsealed
 from .figures import draw_all
 from .frozen import frozen_digest
 from .outcome import CLEAR, CONFIDENT, Outcome
+from .rivals import side_by_side
 from .score import TARGETS, Score, Scores, all_scores, met, rate
 
 _TITLES = {
@@ -59,7 +61,7 @@ def score_check(check: BlindCheck, *, unfinished: bool = False) -> Path:
     lines = [line for line in check.verdicts() if line["case"] in answers]
     outcomes = [Outcome.of(answers[line["case"]], line) for line in lines]
     opened = Unsealed.read(check.folder / "unsealed.json")
-    return _write(check, outcomes, f"seed {opened.seed}", _report_folder(check))
+    return _write(check, lines, outcomes, f"seed {opened.seed}", _report_folder(check))
 
 
 def rehearse_report(check: BlindCheck) -> None:
@@ -90,7 +92,7 @@ def rehearse_report(check: BlindCheck) -> None:
     folder = _report_folder(check)
     try:
         with TemporaryDirectory(prefix=".rehearsal-", dir=folder) as place:
-            _write(check, outcomes, "a rehearsal", Path(place))
+            _write(check, [], outcomes, "a rehearsal", Path(place))
     except OSError as error:
         raise InputError(
             f"{folder}, where the report will go, cannot be written: {error.strerror}; make room "
@@ -110,14 +112,22 @@ def _report_folder(check: BlindCheck) -> Path:
     return folder
 
 
-def _write(check: BlindCheck, outcomes: Sequence[Outcome], origin: str, folder: Path) -> Path:
+def _write(
+    check: BlindCheck,
+    lines: Sequence[Mapping[str, Any]],
+    outcomes: Sequence[Outcome],
+    origin: str,
+    folder: Path,
+) -> Path:
     """Write scores, figures and text into a folder; return the text's path."""
-    found = all_scores(outcomes, check.manifest.methods, frozen_digest())
+    methods = check.manifest.methods
+    found = all_scores(outcomes, methods, frozen_digest())
     write_whole(folder / "scores.json", found.to_json())
-    ours = [o for o in outcomes if o.method == check.manifest.methods[0]]
+    ours = [o for o in outcomes if o.method == methods[0]]
     draw_all(ours, folder)
     report = folder / "report.md"
-    write_whole(report, "\n".join(_text(check, found, outcomes, ours, origin)) + "\n")
+    text = _text(check, found, outcomes, ours, origin, side_by_side(lines, outcomes, methods))
+    write_whole(report, "\n".join(text) + "\n")
     return report
 
 
@@ -127,6 +137,7 @@ def _text(
     outcomes: Sequence[Outcome],
     ours: Sequence[Outcome],
     origin: str,
+    beside: Sequence[str],
 ) -> list[str]:
     manifest = check.manifest
     planned, seen = len(check.cases), len(ours)
@@ -147,6 +158,7 @@ def _text(
         _MEANT,
         "",
         *(line for world in WORLDS for line in _world(world, found)),
+        *beside,
         "![named over size](named.png)",
         "",
         "![is what is said to be present there?](present.png)",

@@ -14,6 +14,8 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
+from fjr_kit.showing import BareRefit
+
 from .excitations import Run
 
 FLOORS = 3.0
@@ -21,8 +23,6 @@ FLOORS = 3.0
 
 _REPEATABILITY = 1e-3
 _STEP = 0.02
-_REFIT_STEPS = 5
-_FARTHEST = 1.5  # factor on a parameter in one step
 
 Player = Callable[[Mapping[str, float], Mapping[str, float]], list[np.ndarray]]
 """Returns y of the first run of each level for a plant and settings, without noise."""
@@ -44,9 +44,9 @@ class Visibility:
             for noise, signal in zip(averaged, self._signal, strict=True)
         ]
         self._base = self._weighed(base)
-        self._names = _free(plant)
-        self._slopes = np.array([self._slope(name) for name in self._names]).T
-        self._basis = np.linalg.qr(self._slopes)[0]
+        names = _free(plant)
+        slopes = np.array([self._slope(name) for name in names]).T
+        self._refit = BareRefit(plant, names, slopes)
 
     def change(self, plant: Mapping[str, float], settings: Mapping[str, float]) -> np.ndarray:
         """Return the change by settings from the bare plant, real (equations,)."""
@@ -58,7 +58,7 @@ class Visibility:
 
     def left(self, change: np.ndarray) -> np.ndarray:
         """Return what a refit of the bare parameters cannot take over."""
-        return change - self._basis @ (self._basis.T @ change)
+        return self._refit.left(change)
 
     def left_by_refit(
         self,
@@ -67,9 +67,8 @@ class Visibility:
     ) -> np.ndarray:
         """Return what a refit of the bare parameters leaves of target positions, (equations,).
 
-        A large effect may bend the parameters so far that slopes at the true ones mislead: an
-        eccentric encoder scales them all, and then hardly shows. So the refit is carried out, by
-        Gauss-Newton steps with the slopes of the bare plant.
+        A large effect, such as an eccentric encoder, which scales all parameters, bends them so far
+        that slopes at the true ones mislead.
 
         Args:
             target: positions with the effect.
@@ -78,17 +77,9 @@ class Visibility:
         Raises:
             Unsuitable: the motion diverges on the way.
         """
-        plant, best = dict(self._plant), None
-        for _ in range(_REFIT_STEPS):
-            change = self.between(target, play(plant))
-            if best is not None and self.share(change) >= self.share(best):
-                break
-            best = change
-            steps = np.linalg.lstsq(self._slopes, change, rcond=None)[0]
-            for name, step in zip(self._names, steps.tolist(), strict=True):
-                plant[name] *= min(max(1.0 + step, 1.0 / _FARTHEST), _FARTHEST)
-        assert best is not None
-        return self.left(best)
+        return self._refit.left_by_refit(
+            lambda plant: self.between(target, play(plant)), self.share
+        )
 
     def relative(self, change: np.ndarray) -> float:
         """Return how far a change shows once refitted, over what the detection limit shows."""
@@ -141,24 +132,3 @@ def _rms(spectrum: np.ndarray) -> float:
 def _size(part: np.ndarray) -> float:
     """Return the rms of complex lines that are written as reals."""
     return float(np.sqrt(2.0 * np.mean(part**2)))
-
-
-def size_showing(
-    shown: Callable[[float], float], wanted: float, start: float, most: float
-) -> float | None:
-    """Return the size at which `shown` is as wanted, within a tenth; None if none up to `most` is.
-
-    Secant search on the logarithm; a size at which the motion diverges shows too much.
-    """
-    low, high = most * 1e-5, most
-    if shown(high) < wanted:
-        return None
-    size = min(start, 0.9 * high)
-    for _ in range(12):
-        ratio = shown(size) / wanted
-        if abs(ratio - 1.0) < 0.1:
-            break
-        low, high = (size, high) if ratio < 1.0 else (low, size)
-        guess = size / ratio if 0.0 < ratio < math.inf else 0.0
-        size = guess if low * 1.05 < guess < high / 1.05 else math.sqrt(low * high)
-    return size

@@ -22,6 +22,7 @@ import numpy as np
 from fjr_interface.bags.folder_names import bag_folder
 from fjr_interface.bags.writer import BagWriter
 from fjr_kit.atomic import new_folder, write_whole
+from fjr_kit.showing import size_showing
 
 from .answers import WORLDS, Answer, Cause, Kind, World
 from .causes import compatible, drawers
@@ -29,7 +30,7 @@ from .draw import Draw
 from .remainders import SCATTER, laws
 from .rigs import log_uniform
 from .stage import Stage, Unsuitable, datasheet, draw_stage, without
-from .visibility import Visibility, size_showing
+from .visibility import Visibility
 
 KINDS: Mapping[World, Mapping[Kind, float]] = {
     "closed": {"none": 0.15, "single": 0.6, "two": 0.25},

@@ -17,11 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import optimize, stats
 
-from fjr_records.noise import NoiseLevels
-from fjr_records.periodic import RecordedExperiment
-
-from ..model.simulated_rig import Model, Simulator
-from .bag_deviations import deviations
+from ..model.simulated_rig import Model
+from .bag_deviations import BagBlocks, BagErrors, deviations
 
 TREND_FALSE_ALARM = 0.005
 """Share of rigs without a trend that one test of one group takes for drifting: of two groups under
@@ -87,25 +84,37 @@ class BagChanges:
 
 
 def bag_changes(
-    recorded: RecordedExperiment, noise: NoiseLevels, simulator: Simulator, model: Model
+    errors: BagErrors,
+    levels: np.ndarray,
+    elapsed_s: np.ndarray | None,
+    model: Model,
+    blocks: BagBlocks | None = None,
 ) -> BagChanges | None:
     """Compare the bags of each level, given a refit model.
 
     None where a slope within levels leaves no degree of freedom (two levels of two bags leave one),
     the model diverges, or a bag does not determine all of its parameters.
+
+    Args:
+        errors: of models in a bag.
+        levels: (bags,), the level of each.
+        elapsed_s: (bags,), when each began; None if that is not known, and then no trend is sought.
+        model: the refit model.
+        blocks: see `deviations`.
     """
-    levels = np.array([r.level for r in recorded.realizations])
     if levels.size - np.unique(levels).size < 2:
         return None
-    found = deviations(recorded, noise, simulator, model)
+    found = deviations(errors, levels.size, model, blocks)
     if found is None:
         return None
-    elapsed_s = np.array([r.experiment.elapsed_s for r in recorded.realizations])
     across = found.accounted >= ACCOUNTED
+    trends = (
+        ()
+        if elapsed_s is None
+        else (_trend(*column, levels, elapsed_s, across) for column in found.groups())
+    )
     return BagChanges(
-        tuple(_trend(*column, levels, elapsed_s, across) for column in found.groups()),
-        tuple(_scatter(*column, levels) for column in found.each()),
-        found.accounted,
+        tuple(trends), tuple(_scatter(*column, levels) for column in found.each()), found.accounted
     )
 
 

@@ -1,12 +1,12 @@
 """How far each parameter of a refit model deviates in each bag.
 
-Bags have different phases, so only a model compares them: what a refit model leaves in a bag is
+Bags have different signals, so only a model compares them: what a refit model leaves in a bag is
 projected on the model's sensitivity to its parameters.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,8 +14,16 @@ import numpy as np
 from fjr_records.noise import NoiseLevels
 from fjr_records.periodic import RecordedExperiment
 from fjr_records.spectra import line_spectrum
+from fjr_sim_node import effects as fx
 
+from ..model.evidence import Evidence
 from ..model.simulated_rig import Model, Simulator
+
+BagErrors = Callable[[Sequence[Model], int], np.ndarray]
+"""Takes models and the index of a bag, returns their errors in it, float64 (models, errors), in
+standard deviations of what is left; not finite where a motion diverges."""
+BagBlocks = Callable[[int], np.ndarray]
+"""Takes the index of a bag, returns the block that each of its errors belongs to, (errors,)."""
 
 GROUPS: dict[str, tuple[str, ...]] = {
     "friction": ("fs", "fsm", "fv", "fvm"),
@@ -62,35 +70,76 @@ class Deviations:
         return columns
 
 
+def periodic_errors(
+    recorded: RecordedExperiment, noise: NoiseLevels, simulator: Simulator
+) -> BagErrors:
+    """Return the errors of steady periods, line by line, in standard deviations of the noise."""
+
+    def errors(models: Sequence[Model], index: int) -> np.ndarray:
+        r = recorded.realizations[index]
+        std = noise.position[noise.row(r.level)]
+        scale = np.concatenate([[1.0], np.full(std.size - 1, np.sqrt(2.0))]) / std
+        measured = r.spectrum(r.position, recorded.lines).mean(0)
+        lines = line_spectrum(simulator.many(models, [index])[:, 0, 0], scale.size)
+        return _parts((lines - measured) * scale)
+
+    return errors
+
+
+def record_errors(evidence: Evidence, variance: np.ndarray) -> tuple[BagErrors, BagBlocks]:
+    """Return the errors of records in standard deviations of each cell, and their blocks.
+
+    Args:
+        evidence: the records.
+        variance: (cells,), of an error in each cell, rad2.
+    """
+    parts = {
+        index: [i for i, part in enumerate(evidence.parts) if part.record == index]
+        for index in range(len(evidence.records.records))
+    }
+
+    def errors(models: Sequence[Model], index: int) -> np.ndarray:
+        scale = np.sqrt(variance[evidence.cell_of(parts[index])])
+        return evidence.errors(models, parts[index]) / scale
+
+    return errors, lambda index: evidence.part_of(parts[index])
+
+
 def deviations(
-    recorded: RecordedExperiment, noise: NoiseLevels, simulator: Simulator, model: Model
+    errors: BagErrors, bags: int, model: Model, blocks: BagBlocks | None = None
 ) -> Deviations | None:
     """Fit the relative deviations of the parameters to each bag.
 
     None if the model diverges, or a bag does not determine all parameters, as where the link never
     moves.
+
+    Args:
+        errors: of models in a bag.
+        bags: how many there are.
+        model: the refit model.
+        blocks: to which block of a bag each error belongs, where errors are alike within a block;
+            None where each errs for itself.
     """
-    on = {n: g for n, g in SCATTERING.items() if any(model.plant.get(part, 0.0) for part in g)}
-    fits = []
-    for index, r in enumerate(recorded.realizations):
-        std = noise.position[noise.row(r.level)]
-        scale = np.concatenate([[1.0], np.full(std.size - 1, np.sqrt(2.0))]) / std
-        measured = r.spectrum(r.position, recorded.lines).mean(0)
-        fit = _fit_bag(simulator, model, list(on.values()), index, measured, scale) if on else None
+    on = [n for n, parts in SCATTERING.items() if any(_has(model, part) for part in parts)]
+    if not on:
+        return None
+    groups, fits = [SCATTERING[name] for name in on], []
+    for index in range(bags):
+        block = None if blocks is None else blocks(index)
+        fit = _fit_bag(errors, model, groups, index, block)
         if fit is None:
             return None
         fits.append(fit)
     values, spread, there, left = (np.array(part) for part in zip(*fits, strict=True))
-    return Deviations(list(on), values, spread, 1.0 - float(left.sum() / there.sum()))
+    return Deviations(on, values, spread, 1.0 - float(left.sum() / there.sum()))
 
 
 def _fit_bag(
-    simulator: Simulator,
+    errors: BagErrors,
     model: Model,
     groups: Sequence[tuple[str, ...]],
     index: int,
-    measured: np.ndarray,
-    scale: np.ndarray,
+    block: np.ndarray | None,
 ) -> tuple[np.ndarray, np.ndarray, float, float] | None:
     """Fit one bag by Gauss-Newton from the model.
 
@@ -103,21 +152,19 @@ def _fit_bag(
     there = least = np.inf
     shifts = STEP * np.vstack([np.zeros(len(groups)), np.eye(len(groups)), -np.eye(len(groups))])
     for _ in range(PASSES):
-        models = [_changed(model, groups, at + shift) for shift in shifts]
-        lines = line_spectrum(simulator.many(models, [index])[:, 0, 0], scale.size)
-        if not np.isfinite(lines).all():
+        rows = errors([_changed(model, groups, at + shift) for shift in shifts], index)
+        if not np.isfinite(rows).all():
             break
-        errors = _parts((measured - lines[0]) * scale)
-        cost = float(errors @ errors)
+        cost = float(rows[0] @ rows[0])
         if cost >= least:
             break
         there, least = (cost if found is None else there), cost
-        ends = np.split(lines[1:], 2)
-        columns = _parts((ends[0] - ends[1]) / (2.0 * STEP) * scale).T
-        step = np.linalg.lstsq(columns, errors, rcond=None)[0]
-        left = float(np.sum((errors - columns @ step) ** 2))
-        chi2 = left / (errors.size - step.size)
-        covariance = np.linalg.pinv(columns.T @ columns) * max(chi2, 1.0)
+        ends = np.split(rows[1:], 2)
+        columns = (ends[0] - ends[1]).T / (2.0 * STEP)
+        step = np.linalg.lstsq(columns, -rows[0], rcond=None)[0]
+        after = rows[0] + columns @ step
+        left = float(after @ after)
+        covariance = _covariance(columns, after, block)
         if not (np.diag(covariance) > 0.0).all():
             return None
         at = np.clip(at + step, -MOST_CHANGE, MOST_CHANGE)
@@ -127,12 +174,42 @@ def _fit_bag(
     return found
 
 
+def _covariance(columns: np.ndarray, left: np.ndarray, block: np.ndarray | None) -> np.ndarray:
+    """Return the covariance of a fit by what it leaves, widened by what is alike in blocks.
+
+    Without blocks the errors are in standard deviations of noise, and never leave less than that.
+    """
+    inverse = np.linalg.pinv(columns.T @ columns)
+    chi2 = float(left @ left) / (left.size - columns.shape[1])
+    if block is None:
+        return inverse * max(chi2, 1.0)
+    plain = inverse * chi2
+    names = np.unique(block)
+    scores = np.array([columns[block == name].T @ left[block == name] for name in names])
+    count = len(names) / max(len(names) - 1, 1)
+    robust = count * np.diag(inverse @ (scores.T @ scores) @ inverse)
+    wider = np.sqrt(np.maximum(robust / np.maximum(np.diag(plain), 1e-300), 1.0))
+    return plain * np.outer(wider, wider)
+
+
+def _added(model: Model, name: str) -> list[str]:
+    """Return the effect parameters of a model that add to a parameter of the bare plant."""
+    return [n for n in model.effects if fx.parameter(n).adds_to == name]
+
+
+def _has(model: Model, name: str) -> bool:
+    own = model.plant.get(name, 0.0)
+    return bool(own) or any(model.effects[n] for n in _added(model, name))
+
+
 def _changed(model: Model, groups: Sequence[tuple[str, ...]], deviation: np.ndarray) -> Model:
     """Return the model with each group of parameters changed by a relative deviation."""
-    plant = dict(model.plant)
+    plant, effects = dict(model.plant), dict(model.effects)
     for group, change in zip(groups, deviation, strict=True):
-        plant |= {name: (1.0 + float(change)) * plant[name] for name in group if name in plant}
-    return Model(plant, model.effects)
+        for name in group:
+            for values, own in ((plant, [name]), (effects, _added(model, name))):
+                values |= {n: (1.0 + float(change)) * values[n] for n in own if n in values}
+    return Model(plant, effects)
 
 
 def _parts(lines: np.ndarray) -> np.ndarray:

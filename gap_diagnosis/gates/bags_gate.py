@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import numpy as np
 from scipy.stats import norm
 
 from fjr_records.noise import NoiseLevels
 from fjr_records.periodic import RecordedExperiment
 
+from ..model.evidence import Evidence
 from ..model.simulated_rig import Model, Simulator
 from ..outcome.diagnosis import Bags, BagTrend, Estimate
 from .bag_changes import TREND_FALSE_ALARM, BagChanges, bag_changes
+from .bag_deviations import periodic_errors, record_errors
 from .gate_checks import Gate, GateReport, untested
 
 SCATTER_SHOWN = 1e-3
@@ -44,23 +47,60 @@ def bags_gate(
         "two bags more than levels, two periods each, and motion that determines friction and "
         "stiffness in each bag"
     )
-    changes = bag_changes(recorded, noise, simulator, model) if noise is not None else None
+    changes = periodic_changes(recorded, noise, simulator, model) if noise is not None else None
     if changes is None:
         return untested(name, needs)
     worst = min(changes.trends, key=lambda trend: trend.p_value)
-    elapsed_s = [r.experiment.elapsed_s for r in recorded.realizations]
-    span_s = max(elapsed_s) - min(elapsed_s)
+    span_s = float(np.ptp([r.experiment.elapsed_s for r in recorded.realizations]))
     passed = worst.p_value > TREND_FALSE_ALARM
-    scatter = _scattering(changes)
+    scatter = scattering(changes)
     if passed:
-        sentence = "neither friction nor stiffness follows a trend from bag to bag" + scatter
+        sentence = "neither friction nor stiffness follows a trend from bag to bag"
+        sentence += f"; without one, {scatter} scatters." if scatter else "."
     else:
         sentence = (
             f"{worst.group} follows a trend from bag to bag (by chance in {worst.p_value:.1g} of "
             f"rigs that only scatter), along a line by {worst.slope_per_s * span_s:+.2%} over the "
             "record; let the rig warm up, or record levels interleaved."
         )
-    detail = Bags(
+    z, limit = (float(norm.isf(0.5 * max(p, 1e-300))) for p in (worst.p_value, TREND_FALSE_ALARM))
+    return Gate(
+        name=name,
+        passed=passed,
+        value=z,
+        limit=limit,
+        sentence=sentence,
+        hint="nonstationary",
+        bags=as_bags(changes, span_s),
+        telling=passed and bool(scatter),
+    )
+
+
+def periodic_changes(
+    recorded: RecordedExperiment, noise: NoiseLevels, simulator: Simulator, model: Model
+) -> BagChanges | None:
+    """Return what changes from bag to bag of steady periods; see `bag_changes`."""
+    levels = np.array([r.level for r in recorded.realizations])
+    elapsed_s = np.array([r.experiment.elapsed_s for r in recorded.realizations])
+    return bag_changes(periodic_errors(recorded, noise, simulator), levels, elapsed_s, model)
+
+
+def record_changes(evidence: Evidence, variance: np.ndarray, model: Model) -> BagChanges | None:
+    """Return how parameters scatter from record to record; see `bag_changes`.
+
+    Args:
+        evidence: the records.
+        variance: (cells,), of an error in each cell, rad2.
+        model: the best model.
+    """
+    levels = np.array([r.level for r in evidence.records.records])
+    errors, blocks = record_errors(evidence, variance)
+    return bag_changes(errors, levels, None, model, blocks)
+
+
+def as_bags(changes: BagChanges, span_s: float) -> Bags:
+    """Return changes as the outcome holds them; `span_s` is from the first bag to the last."""
+    return Bags(
         trends={
             t.group: BagTrend(change_percent=100.0 * t.slope_per_s * span_s, p_value=t.p_value)
             for t in changes.trends
@@ -71,24 +111,13 @@ def bags_gate(
         },
         accounted=changes.accounted,
     )
-    z, limit = (float(norm.isf(0.5 * max(p, 1e-300))) for p in (worst.p_value, TREND_FALSE_ALARM))
-    return Gate(
-        name=name,
-        passed=passed,
-        value=z,
-        limit=limit,
-        sentence=sentence,
-        hint="nonstationary",
-        bags=detail,
-        telling=passed and bool(scatter),
-    )
 
 
-def _scattering(changes: BagChanges) -> str:
-    """Return the end of a sentence on the parameters that scatter beyond what is uncertain."""
+def scattering(changes: BagChanges) -> str:
+    """Return which parameters scatter beyond what is uncertain, each by how much; empty if none."""
     seen = [
         f"{s.parameter} by {100.0 * s.value:.2g} % ({100.0 * s.low:.2g} to {100.0 * s.high:.2g} %)"
         for s in changes.scatters
         if s.low > SCATTER_SHOWN
     ]
-    return f"; without one, {', '.join(seen)} scatters." if seen else "."
+    return ", ".join(seen)

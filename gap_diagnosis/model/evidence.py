@@ -25,8 +25,8 @@ from .simulated_rig import Model
 Purpose = Literal["fit", "select", "report"]
 
 WINDOWS = 24
-"""Windows into which the shortest record is cut, at least; a single record into twice as many,
-since it serves all purposes."""
+"""Windows into which the shortest record is cut, at least; twice as many where a level has a single
+record, since that serves all purposes, and a test of few blocks shows nothing."""
 _LONGEST_WINDOW_S = 4.0
 _WINDOWS_PER_BLOCK = 2
 _PURPOSES: tuple[Purpose, ...] = ("fit", "select", "report")
@@ -46,12 +46,14 @@ class Part:
         level: index of its level.
         windows: which windows.
         purpose: what it is for.
+        stretch: of the record, in time; what is left on parts of one stretch is alike.
     """
 
     record: int
     level: int
     windows: slice
     purpose: Purpose
+    stretch: int
 
 
 class Evidence:
@@ -77,7 +79,9 @@ class Evidence:
         self.records = records
         rate = records.sample_rate_hz
         shortest = min(r.samples for r in records.records)
-        windows = WINDOWS if len(records.records) > 1 else 2 * WINDOWS
+        levels = [r.level for r in records.records]
+        alone = any(levels.count(level) == 1 for level in levels)
+        windows = 2 * WINDOWS if alone else WINDOWS
         hop = min(shortest / (windows + 1), 0.5 * _LONGEST_WINDOW_S * rate)
         self.hop = max(2 * int(hop / 2), 8)
         self._measured = [lapped(r.position, self.hop) for r in records.records]
@@ -165,6 +169,12 @@ class Evidence:
         """Return the index of the part of each error, int (errors,)."""
         return np.repeat(which, [self.windows(i) * self.lines for i in which])
 
+    def stretch_of(self, which: Sequence[int]) -> np.ndarray:
+        """Return the index of the first of these parts in the stretch of each error, (errors,)."""
+        first: dict[tuple[int, int], int] = {}
+        begins = [first.setdefault((self.parts[i].record, self.parts[i].stretch), i) for i in which]
+        return np.repeat(begins, [self.windows(i) * self.lines for i in which])
+
     def windows(self, part: int) -> int:
         """Return the number of windows of a part."""
         return self.parts[part].windows.stop - self.parts[part].windows.start
@@ -206,9 +216,9 @@ def _parts(records: RecordSet, hop: int) -> list[Part]:
             ends = np.linspace(0, count, blocks + 1).astype(int)
             for block in range(blocks):
                 purpose = _purpose(len(members), place, block + number)
-                parts.append(
-                    Part(index, level, slice(int(ends[block]), int(ends[block + 1])), purpose)
-                )
+                windows = slice(int(ends[block]), int(ends[block + 1]))
+                stretch = block // len(_CYCLE) if len(members) == 1 else block
+                parts.append(Part(index, level, windows, purpose, stretch))
     return parts
 
 

@@ -76,11 +76,12 @@ def read_nominal(source: str | Path) -> dict[str, float]:
             f"{where}: {', '.join(missing)} missing; a nominal file names all of "
             f"{', '.join(PLANT.names)}, or use --nominal paper for the paper's values."
         )
-    _refuse_effects(checked, where)
+    refuse_effects(checked, where)
     return {name: float(checked[name]) for name in PLANT.names}
 
 
-def _refuse_effects(values: Mapping[str, object], where: str) -> None:
+def refuse_effects(values: Mapping[str, object], where: str) -> None:
+    """Raise InputError if values of SIMULATOR switch an effect on; `where` names their place."""
     for effect in fx.CATALOGUE:
         for name in effect.size_names:
             if values[name] != SIMULATOR[name].default:

@@ -7,9 +7,11 @@ drives the model, and an observer holds its motion to the recorded position (`pr
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
+from controller_node.transfer_function import TransferFunction
 from fjr_kit.errors import InputError
 from fjr_records.record_noise import RecordNoise
 from fjr_records.records import Record, RecordSet
@@ -21,8 +23,52 @@ from .record_loop import RecordLoop, loop_of
 from .simulated_rig import Model, run_parallel
 
 _AT_REST = 5.0  # standard deviations of noise that a record at rest may begin away from zero
-_FIRST_SAMPLES = 10
+_FIRST_SAMPLES, _HIGHEST_DEGREE = 10, 4
+_ONLY_NOISE = 1.1  # standard deviations that a fit to the first samples leaves by chance
 _MOST_STEPS, _MOST_STEPS_A_SAMPLE = 1e6, 20.0  # of the integration of one run
+
+
+@dataclass(frozen=True)
+class Drive:
+    """What drives a simulation of one run: the loop that was recorded, or an observer.
+
+    Attributes:
+        reference: r of the law, float64 (samples,) in rad: the recorded one, or the recorded
+            position where an observer holds the motion to it.
+        law: the controller, or the observer.
+        added_torque: recorded torque beside the observer's, (samples,) in N m; None in the loop.
+        start: position (rad) and velocity (rad/s) at the first sample.
+        entry: state of the law before it; None for zero.
+    """
+
+    reference: np.ndarray
+    law: TransferFunction
+    added_torque: np.ndarray | None
+    start: tuple[float, float]
+    entry: np.ndarray | None = None
+
+    @property
+    def observed(self) -> bool:
+        """Whether an observer takes the place of a controller that is not known."""
+        return self.added_torque is not None
+
+    def simulated(
+        self, sample_rate_hz: float, p: tuple[float, ...], e: np.ndarray | None
+    ) -> Trajectory:
+        """Return the simulated run of a rig.
+
+        Args:
+            sample_rate_hz: rate of the samples.
+            p: from `plant.coefficients`.
+            e: from `effects.coefficients`, or None.
+
+        Raises:
+            InputError: the motion diverged.
+        """
+        return simulate_law(
+            self.reference, sample_rate_hz, p, self.law, None, e,
+            added_torque=self.added_torque, start=self.start, controller_state=self.entry,
+        )  # fmt: skip
 
 
 class RecordSimulator:
@@ -96,23 +142,29 @@ class RecordSimulator:
         model, index = job
         record = self.records.records[index]
         try:
-            return self._observed(model, index).torque - record.torque
+            run = self._observed(index).simulated(self._rate, *_coefficients(model))
+            return run.torque - record.torque
         except InputError:
             return np.full(record.samples, np.nan)
 
-    def _observed(self, model: Model, index: int) -> Trajectory:
-        record, (p, e) = self.records.records[index], _coefficients(model)
-        return simulate_law(
-            record.position, self._rate, p, self._observer, None, e,
-            added_torque=record.torque, start=self._starts[index],
-        )  # fmt: skip
+    def drive(self, index: int) -> Drive:
+        """Return what drives a simulation of one run."""
+        law, record = self.loop.laws[index], self.records.records[index]
+        if law is None:
+            return self._observed(index)
+        assert record.reference is not None
+        return Drive(record.reference, law, None, self._starts[index], self._entries[index])
+
+    def _observed(self, index: int) -> Drive:
+        record = self.records.records[index]
+        return Drive(record.position, self._observer, record.torque, self._starts[index])
 
     def _one(self, job: tuple[Model, int]) -> np.ndarray:
         model, index = job
         if self._too_stiff(model, index):
             return np.full((3, self.records.records[index].samples), np.nan)
         try:
-            run = self._simulated(model, index)
+            run = self.drive(index).simulated(self._rate, *_coefficients(model))
         except InputError:
             return np.full((3, self.records.records[index].samples), np.nan)
         return np.array([run.position, run.torque, run.motor if model.rigid else run.link])
@@ -124,30 +176,32 @@ class RecordSimulator:
         steps = seconds * plant.steps_per_second(self._speeds[index], self._torques[index], p, e)
         return bool(steps > max(_MOST_STEPS, _MOST_STEPS_A_SAMPLE * record.samples))
 
-    def _simulated(self, model: Model, index: int) -> Trajectory:
-        law = self.loop.laws[index]
-        if law is None:
-            return self._observed(model, index)
-        record, (p, e) = self.records.records[index], _coefficients(model)
-        assert record.reference is not None
-        return simulate_law(
-            record.reference, self._rate, p, law, None, e,
-            start=self._starts[index], controller_state=self._entries[index],
-        )  # fmt: skip
 
-
-def _coefficients(model: Model) -> tuple[tuple[float, ...], tuple[float, ...] | None]:
+def _coefficients(model: Model) -> tuple[tuple[float, ...], np.ndarray | None]:
     return model.plant_coefficients, model.effect_coefficients
 
 
 def _start(record: Record, noise: RecordNoise) -> tuple[float, float]:
-    """Return position (rad) and velocity (rad/s) at the first sample; zero where noise explains."""
+    """Return position (rad) and velocity (rad/s) at the first sample; zero where noise explains.
+
+    The polynomial of lowest degree that leaves no more than noise tells a run that begins to move
+    from rest, whose speed grows from zero, from one that moves already.
+    """
     first = record.position[:_FIRST_SAMPLES]
     std = noise.std_rad if noise.known else 0.0
     if np.abs(first).max() <= _AT_REST * std:
         return 0.0, 0.0
-    time = np.arange(first.size) / record.description.sample_rate_hz
     if np.ptp(first) <= 2.0 * _AT_REST * std:
         return float(first.mean()), 0.0
-    speed, position = np.polyfit(time, first, 1)
-    return float(position), float(speed)
+    time = np.arange(first.size) / record.description.sample_rate_hz
+    for degree in range(1, _HIGHEST_DEGREE + 1):
+        powers = np.vander(time / time[-1], degree + 1, increasing=True)
+        found = np.linalg.lstsq(powers, first, rcond=None)[0]
+        left = first - powers @ found
+        scatter = float(np.sqrt(left @ left / (first.size - found.size)))
+        if scatter <= _ONLY_NOISE * std:
+            break
+    error = max(scatter, std) * np.sqrt(np.diag(np.linalg.inv(powers.T @ powers)))
+    if np.all(np.abs(found[:2]) <= _AT_REST * error[:2]):
+        return 0.0, 0.0
+    return float(found[0]), float(found[1] / time[-1])

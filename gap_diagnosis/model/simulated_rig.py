@@ -74,7 +74,7 @@ class Model:
         return plant.moves_as_one({"k0": math.inf, **self.plant, **self.effects})
 
     @property
-    def effect_coefficients(self) -> tuple[float, ...] | None:
+    def effect_coefficients(self) -> np.ndarray | None:
         """Effects as the compiled plant takes them; None if all are off."""
         return fx.coefficients(self.effects)
 

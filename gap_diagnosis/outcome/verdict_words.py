@@ -11,6 +11,12 @@ from .diagnosis import Diagnosis, ReportedOn, Verdict
 
 ROUNDING = "encoder_quantization"
 """The effect that acts like noise in a loop, and is judged by its statistics."""
+OUT_OF_TIME = "The time budget ended the search before all effects were tried."
+"""Note of a diagnosis whose search was cut."""
+_CUT = (
+    "A gap remains after the refit, and the time budget ended the search for its cause. That is "
+    "no proof that no effect of the catalogue explains it: give a greater --budget, or --effects."
+)
 
 
 @dataclass(frozen=True)
@@ -111,6 +117,8 @@ HELD_OUT: dict[ReportedOn, str] = {"records": "held-out", "blocks": "held-out", 
 
 def meaning(diagnosis: Diagnosis) -> str:
     """Return what the verdict says about rig and simulation."""
+    if diagnosis.verdict == "unexplained" and OUT_OF_TIME in diagnosis.notes:
+        return _CUT
     return WORDS[diagnosis.verdict].meaning.format(on=ON[diagnosis.reported_on])
 
 

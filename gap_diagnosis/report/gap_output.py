@@ -16,7 +16,7 @@ from controller_node.pd_filtered import CONTROLLER
 from excitation_node.multisine import EXCITATION
 from fjr_interface.parameter_file import save_parameter_file
 from fjr_interface.parameters import ParameterGroup
-from fjr_kit.atomic import result_folder
+from fjr_kit.atomic import result_folder, write_whole
 from fjr_kit.figure_style import STYLE, save
 from fjr_sim_node.simulation.simulator import SIMULATOR
 
@@ -26,12 +26,15 @@ from ..record_investigation import RecordInvestigation
 from .gap_figures import draw_residual_torque, draw_sigma_lines, draw_sigma_maps
 from .gap_plots import STAGES
 from .gap_report import render_gap_report, stages
+from .randomisation import randomisation_yaml, ranges
 from .record_figures import record_figures
 from .record_report import compared, render_record_report
 from .updated_parameters import updated_values
 from .waterfall import bars, draw_waterfall
 
-OWN_FILES = ("report.html", "diagnosis.json", "updated.yaml", "figures/*.p[nd][gf]")
+OWN_FILES = (
+    "report.html", "diagnosis.json", "updated.yaml", "randomisation.yaml", "figures/*.p[nd][gf]",
+)  # fmt: skip
 """What an earlier diagnosis may have left in a folder, as patterns."""
 
 GROUPS: dict[str, ParameterGroup] = {
@@ -52,7 +55,7 @@ def write_diagnosis(
     command: str | None = None,
     date: str | None = None,
 ) -> Path:
-    """Write diagnosis.json, updated.yaml, figures/ and report.html into `out`.
+    """Write diagnosis.json, updated.yaml, randomisation.yaml, figures/ and report.html into `out`.
 
     Everything is written to a temporary folder first and moved when whole; files of an earlier
     diagnosis are replaced, other files in `out` stay.
@@ -77,11 +80,14 @@ def write_diagnosis(
             progress("writing updated.yaml")
             values = updated_values(investigation.recorded, investigation.diagnosis)
             save_parameter_file(folder / "updated.yaml", values, GROUPS)
+            progress("writing randomisation.yaml")
+            found = ranges(investigation.diagnosis.parameters, investigation.diagnosis.bags)
+            write_whole(folder / "randomisation.yaml", randomisation_yaml(found))
         made = provenance(command, date)
         if isinstance(investigation, RecordInvestigation):
-            found = compared(investigation)
-            drawings = record_figures(found, known=investigation.evidence.noise.known)
-            text = render_record_report(investigation, found, made)
+            compare = compared(investigation)
+            drawings = record_figures(compare, known=investigation.evidence.noise.known)
+            text = render_record_report(investigation, compare, made)
         else:
             drawings = dict(_figures(investigation))
             text = render_gap_report(investigation, made)

@@ -8,6 +8,7 @@ cell). Models are compared by the log-likelihood of parts that no fit has seen.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -62,6 +63,7 @@ class CellFitter:
         nominal: datasheet values of the base parameters.
         tolerance: how far one may be off, relative.
         fit_parts, select_parts: indices of parts.
+        groups: (errors,), the stretch of time of each error of the fit, by its first part.
     """
 
     def __init__(self, evidence: Evidence, nominal: Mapping[str, float], tolerance: float) -> None:
@@ -72,7 +74,7 @@ class CellFitter:
         self._rippled: tuple[CellFit, RecordRipples] | None = None
         self._cell = evidence.cell_of(self.fit_parts)
         self._floor = evidence.floor(self.fit_parts)
-        self.groups = evidence.part_of(self.fit_parts)
+        self.groups = evidence.stretch_of(self.fit_parts)
         evidence = self.evidence
         bands = evidence.cell_of(self.select_parts) % evidence.bands
         place = {part: k for k, part in enumerate(self.select_parts)}
@@ -132,7 +134,11 @@ class CellFitter:
         return best
 
     def without(self, fit: CellFit, effect: str) -> CellFit:
-        """Return a fit with one effect taken out and all else fitted anew."""
+        """Return a fit with one effect taken out and all else fitted anew.
+
+        Its weights begin with what is left where the effect is missing: with those of the fit, the
+        cells in which it acts would pull all other parameters away.
+        """
         names = tuple(n for n in fit.space.effects if not n.startswith(f"{effect}."))
         units = tuple(
             u for n, u in zip(fit.space.effects, fit.space.units, strict=True) if n in names
@@ -140,7 +146,18 @@ class CellFitter:
         space = replace(fit.space, effects=names, units=units)
         start = space.point(fit.model)
         rest = tuple(e for e in fit.effects if e != effect)
-        return self._reweighted(rest, space, start, fit.variance, _ADDED_ROUNDS)
+        errors = self.evidence.errors([space.model(start)], self.fit_parts)[0]
+        return self._reweighted(rest, space, start, self._variance(errors), _REFIT_ROUNDS)
+
+    def misfit(self, fit: CellFit) -> float:
+        """Return what a fit leaves on unseen parts over noise and the simulation's own error.
+
+        A mean over all errors: 1 where nothing else is left; NaN where noise is not known.
+        """
+        if not self.evidence.noise.known:
+            return math.nan
+        relative = fit.left / self._select_floor - 1.0
+        return float(np.sum(self._counts * relative) / self._counts.sum())
 
     def gains(self, after: CellFit, before: CellFit) -> np.ndarray:
         """Return the log-likelihood that one fit gains over another on each part that selects.
@@ -153,6 +170,17 @@ class CellFitter:
         """
         counts = self._counts
         return 0.5 * np.sum(counts * np.log(before.left / after.left), axis=1)
+
+    def closed(self, after: CellFit, before: CellFit) -> float:
+        """Return how much of what one fit leaves on unseen parts another closes, in one band.
+
+        The band is the one in which it gains most log-likelihood: a delay shows at high
+        frequencies, where little of the motion is.
+        """
+        left = [np.sum(self._counts * fit.left, axis=0) for fit in (before, after)]
+        gained = self._counts.sum(axis=0) * np.log(left[0] / left[1])
+        most = int(np.argmax(gained))
+        return float(1.0 - left[1][most] / left[0][most])
 
     def _left(self, model: Model) -> np.ndarray:
         parts = self.select_parts

@@ -10,11 +10,14 @@ into the bare parameters beside it, whose intervals are widened by what blind ca
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from fjr_sim_node import effects as fx
 
-from ..outcome.diagnosis import Estimate
+from ..gates.bag_deviations import SCATTERING
+from ..outcome.diagnosis import Bags, Estimate
 from .fits import Fit
 
 WIDENING: tuple[float, ...] = (1.0, 1.27, 1.92)
@@ -99,6 +102,54 @@ def sure(fit: Fit, groups: np.ndarray) -> bool:
         )
         for effect in fit.effects
     )
+
+
+def with_scatter(found: dict[str, Estimate], bags: Bags | None, runs: int) -> dict[str, Estimate]:
+    """Return intervals of the mean over all runs that could have been recorded.
+
+    A fit to a few runs knows their mean; what parameters scatter from run to run comes on top, by
+    its variance over the number of runs.
+
+    Args:
+        found: parameters with the intervals of a fit.
+        bags: how far each scatters; None where that is not known.
+        runs: how many runs the fit has seen.
+    """
+    scatter = run_scatter(found, bags)
+    widened = dict(found)
+    for name, std in scatter.items():
+        e, added = found[name], _NORMAL_95 * std / np.sqrt(runs)
+        widened[name] = Estimate(
+            value=e.value,
+            low=max(e.value - np.hypot(e.value - e.low, added), min(e.low, 0.0)),
+            high=e.value + np.hypot(e.high - e.value, added),
+        )
+    return widened
+
+
+def run_scatter(found: Mapping[str, Estimate], bags: Bags | None) -> dict[str, float]:
+    """Return the standard deviation of parameters from run to run, each in its own unit.
+
+    What the bare plant lacked scatters as the parameter that it adds to.
+
+    Args:
+        found: parameters with their intervals.
+        bags: how far each scatters; None where that is not known.
+    """
+    if bags is None:
+        return {}
+    scattering = {
+        part: estimate.value / 100.0
+        for name, estimate in bags.scatter_percent.items()
+        for part in SCATTERING[name]
+        if estimate.low > 0.0
+    }
+    origin = {name: fx.parameter(name).adds_to if "." in name else name for name in found}
+    return {
+        name: abs(found[name].value) * scattering[part]
+        for name, part in origin.items()
+        if part in scattering
+    }
 
 
 def standard_errors(

@@ -79,7 +79,8 @@ def invariance(fitter: CellFitter, fit: CellFit, effect: str) -> float | None:
     """Return how often chance makes an effect's size differ so much between levels.
 
     The sizes are free at each level while all else is common, to first order; their covariance is
-    robust to what is alike within a part (sandwich estimate by clusters).
+    robust to what is alike within a part (sandwich estimate by clusters). It rests on few parts, so
+    that the Wald statistic follows an F distribution, with the freedom of the level of fewest.
 
     Returns:
         p-value of the Wald test that they are equal; None with one level.
@@ -124,7 +125,8 @@ def _equal(
     contrast = np.eye(k)[1:] - np.eye(k)[:1]
     difference = contrast @ values
     statistic = float(difference @ np.linalg.pinv(contrast @ spread @ contrast.T) @ difference)
-    return float(stats.chi2.sf(statistic, k - 1))
+    blocks = min(np.unique(groups[level == one]).size for one in levels)
+    return float(stats.f.sf(statistic / (k - 1), k - 1, max(blocks - 1, 1)))
 
 
 def where_it_acts(

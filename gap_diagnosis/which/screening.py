@@ -152,7 +152,7 @@ def _candidates(
     `own` is what the base parameters can't follow of `changes`.
     """
     found = []
-    for members in _by_shape(seeds).values():
+    for members in by_shape(seeds).values():
         weights, *_ = np.linalg.lstsq(own[members].T, -parent.residuals, rcond=1e-9)
         gain = -float(weights @ (own[members] @ parent.residuals))
         if len(members) == 1:
@@ -173,7 +173,7 @@ def _candidates(
     return found
 
 
-def _by_shape(seeds: Sequence[Mapping[str, float]]) -> dict[tuple, list[int]]:
+def by_shape(seeds: Sequence[Mapping[str, float]]) -> dict[tuple, list[int]]:
     """Group seeds that differ only in the phases 0 and a quarter turn, in this order."""
     groups: dict[tuple, list[int]] = {}
     for index, seed in enumerate(seeds):

@@ -19,6 +19,8 @@ from .cell_fits import CellFit, CellFitter
 
 MOST_CAUSES = 4
 _PROPOSED, _FITTED = 6, 4
+NOTHING_LEFT = 2.0
+"""Mean squared error over noise below which noise explains what is left."""
 LEAST_GAIN = 1.0
 """Least mean gain of log-likelihood of an unseen part (nats)."""
 LEAST_SHARE = 0.75
@@ -44,7 +46,7 @@ class Gain:
         mean: mean over unseen parts of the log-likelihood gained (nats).
         without_best: the same without the part that gains most.
         share: share of parts that gain, of those in which anything changes.
-        p: p-value of Wilcoxon's signed-rank test against no gain.
+        p: p-value of Wilcoxon's signed-rank test of these parts against no gain.
     """
 
     mean: float
@@ -70,7 +72,7 @@ def gain(fitter: CellFitter, after: CellFit, before: CellFit) -> Gain:
         float(difference.mean()),
         float(np.delete(difference, most).mean()),
         float(np.mean(telling > 0.0)),
-        float(stats.wilcoxon(difference, alternative="greater").pvalue),
+        float(stats.wilcoxon(telling, alternative="greater").pvalue),
     )
 
 
@@ -120,6 +122,8 @@ class Stepwise:
         """Search forward from the fit of the base parameters alone."""
         found = Found([refit])
         while len(found.best.effects) < MOST_CAUSES:
+            if self._fitter.misfit(found.best) < NOTHING_LEFT:
+                break
             if self._over:
                 found.complete = False
                 break

@@ -320,7 +320,8 @@ def test_write_result_makes_all_files_and_the_same_bytes_again(tmp_path):
     report = write_result(made, tmp_path / "a", progress=said.append)
     write_result(made, tmp_path / "deep" / "b")
     first = contents(tmp_path / "a")
-    figures = {f"figures/level_{i}_{n}" for i in (0, 1) for n in ("bla", "spectra", "distortion")}
+    kinds = ("bla", "loop", "nyquist", "spectra", "distortion")
+    figures = {f"figures/level_{i}_{n}" for i in (0, 1) for n in kinds}
     figures |= {"figures/levels", "figures/checks"}
     names = {f"{name}.{kind}" for name in figures for kind in ("png", "pdf")}
     names |= {"result.json", "frf.csv", "frf.npz", "frf.mat", "report.html"}

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import rig_records as rigs
+from html_page import Page
 
 from bla_analyzer import analyze, load_result, write_result
 from bla_analyzer.results.findings import findings
@@ -96,3 +97,14 @@ def test_records_and_the_methods_of_multisines_do_not_meet(tmp_path):
     write(tmp_path / "rig" / "one", data())
     with pytest.raises(InputError, match="robust and fast method are for multisines"):
         analyze(tmp_path / "rig", method="robust")
+
+
+def test_the_report_of_records_has_the_sensitivity_or_says_why_not(tmp_path):
+    page = write_result(analyze(write(tmp_path / "r", data())), tmp_path / "out", figures=False)
+    plots = Page(page.read_text("utf-8")).data()["levels"][0]
+    assert {"bla", "coherence", "nyquist", "loop", "sensitivity"} < set(plots)
+    silent = write(tmp_path / "uy", data(), "uy")
+    page = write_result(analyze(silent), tmp_path / "without", figures=False)
+    shown = Page(page.read_text("utf-8"))
+    assert not {"sensitivity", "loop"} & set(shown.data()["levels"][0])
+    assert "No sensitivity: no reference was recorded" in " ".join(shown.texts)

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,8 +10,11 @@ from plotly.offline import get_plotlyjs
 from synthetic_result import make_result
 
 from bla_analyzer.report.report_page import render_report
-from bla_analyzer.results.result import Result
+from bla_analyzer.results.result import LinkBla, Result
+from bla_analyzer.results.terms import TERMS
+from bla_analyzer.results.terms import glossary as terms_of_glossary
 from fjr_kit.check import Check
+from fjr_kit.document_tables import in_step
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +79,7 @@ def test_texts_from_bags_cannot_become_code():
 
 def test_the_plots_hold_the_numbers(result, html):
     plots = Page(html).data()
-    assert len(plots["levels"]) == 3 and set(plots["overview"]) == {"all-bla", "all-v", "all-power"}
+    assert len(plots["levels"]) == 3
     bla = result.levels[1].bla
     traces = [t for t in plots["levels"][1]["bla"]["data"] if t["name"].startswith("BLA")]
     points = sorted(
@@ -90,6 +94,91 @@ def test_the_plots_hold_the_numbers(result, html):
         if t["name"] == "even distortion" and t["mode"] == "lines"
     ]
     assert np.allclose(even["y"], 20 * np.log10(result.levels[1].even.smoothed), rtol=1e-5)
+
+
+def test_the_page_holds_every_view(html):
+    plots = Page(html).data()
+    over = {"all-bla", "all-coherence", "all-sensitivity", "all-v", "all-power"}
+    own = {"bla", "coherence", "nyquist", "loop", "sensitivity", "spectra", "distortion", "time"}
+    assert set(plots["overview"]) == over
+    assert [set(level) for level in plots["levels"]] == [own] * 3
+    over_frequency = {"all-bla", "all-coherence", "all-sensitivity", "bla", "coherence"}
+    over_frequency |= {"sensitivity", "spectra", "distortion"}
+    every = plots["overview"] | plots["levels"][0]
+    assert {name for name, plot in every.items() if plot.get("linked")} == over_frequency
+    assert {name for name, plot in every.items() if plot.get("plane")} == {"nyquist", "loop"}
+    switches = [a for tag, a in Page(html).tags if tag == "button" and "data-level" not in a]
+    assert [a.get("data-unit") or a.get("data-scale") for a in switches] == [
+        *("Hz", "rad/s", "log", "linear", None)
+    ]
+
+
+def test_the_band_and_the_discs_are_those_of_the_result(result, html):
+    level, plots = result.levels[1], Page(html).data()["levels"][1]
+    [band] = [t for t in plots["bla"]["data"] if t["name"] == "95 % band" and "yaxis" not in t]
+    size, count = abs(level.bla.g), level.bla.g.size
+    low, high = band["y"][:count], band["y"][count : 2 * count][::-1]
+    assert np.allclose(high, 20 * np.log10(size + level.bla.radius_95), rtol=1e-5)
+    bottom = np.maximum(size - level.bla.radius_95, 0.1 * size)
+    assert np.allclose(low, 20 * np.log10(bottom), rtol=1e-5)
+    [disc] = [t for t in plots["loop"]["data"] if t["name"] == "95 % discs"]
+    edge = np.array([complex(x, y) for x, y in zip(disc["x"][:24], disc["y"][:24], strict=True)])
+    found = level.bla.sensitivity
+    away = abs(1.0 / (edge + 1.0) - found.s[0])
+    assert np.allclose(away, found.s_radius_95[0], rtol=1e-2)
+    [top] = [t for t in plots["sensitivity"]["data"] if t["name"].startswith("Ms")]
+    peak = np.nanmax(np.where(level.bla.reliable, abs(found.s), np.nan))
+    assert 10 ** (top["y"][0] / 20) == pytest.approx(peak, rel=1e-4)
+
+
+def told(made: Result) -> str:
+    return " ".join(" ".join(Page(render_report(made, {})).texts).split())
+
+
+def test_a_view_that_cannot_be_had_is_told_in_words(result):
+    assert "No sensitivity" not in told(result)
+    level = result.levels[0]
+
+    def with_bla(**changes) -> Result:
+        bla = level.bla.model_copy(update=changes)
+        return result.model_copy(update={"levels": (level.model_copy(update={"bla": bla}),)})
+
+    silent = with_bla(sensitivity=None)
+    assert "no reference was recorded that moves apart from the torque" in told(silent)
+    law = {"kind": "pd", "p": 9.0, "d": 1.0, "derivative_on": "measurement"}
+    other = silent.model_copy(update={"controller": law})
+    assert "the controller does not act on the error alone" in told(other)
+    unknown = np.full(level.bla.g.shape, np.nan)
+    bare = with_bla(coherence=unknown, radius_95=unknown)
+    assert "No coherence" in told(bare) and "No 95 % band" in told(bare)
+    none = level.model_copy(update={"bla": None, "comparisons": ()})
+    without = result.model_copy(update={"levels": (none,)})
+    assert "There is no BLA at this level, so neither" in told(without)
+
+
+def test_the_page_and_the_glossary_say_the_same(html):
+    glossary = Path(__file__).parents[2] / "docs" / "glossary.md"
+    document = glossary.read_text("utf-8")
+    made = in_step(document, {"terms of an analysis": terms_of_glossary()})
+    assert made == document, "renew: python -m bla_analyzer.results.terms docs/glossary.md"
+    page = Page(html)
+    assert {"V", "M", "P"} < set(TERMS) and set(TERMS.values()) <= set(page.texts)
+    tips = {attrs["title"] for tag, attrs in page.tags if tag == "abbr"}
+    assert {TERMS[word] for word in ("V", "M", "P", "S", "Ms")} <= tips <= set(TERMS.values())
+
+
+def test_the_link_position_is_in_every_view_of_g(result):
+    bla = result.levels[0].bla
+    half = {"g": 0.5 * bla.g, "radius_95": 0.5 * bla.radius_95, "var_total": 0.25 * bla.var_total}
+    link = LinkBla.of(bla.model_copy(update=half), 0.5 * bla.var_total + 0j, 0j * bla.var_total)
+    level = result.levels[0].model_copy(update={"bla": bla.model_copy(update={"link": link})})
+    made = result.model_copy(update={"levels": (level,)})
+    [plots] = Page(render_report(made, {})).data()["levels"]
+    for view, count in (("bla", 5), ("coherence", 1), ("nyquist", 2)):
+        names = [t["name"] for t in plots[view]["data"] if "link position" in t["name"]]
+        assert len(names) == count, view
+    text = told(made)
+    assert "Lines of Level 0, 1 mrad, link position" in text and text.count("correlation") == 1
 
 
 def test_only_significant_nonlinear_variance_is_drawn(result, html):

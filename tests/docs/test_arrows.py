@@ -16,7 +16,7 @@ from paths import ROOT
 NODES = ("controller_node", "excitation_node", "fjr_sim_node")
 ORDER = (
     *("fjr_kit", "fjr_interface", NODES, "fjr_records", "bla_analyzer", "gap_diagnosis"),
-    *("fjr_bringup", "fjr_validation", "fjr_cli"),
+    *("fjr_export", "fjr_compare", "fjr_bringup", "fjr_validation", "fjr_cli"),
 )
 """A package imports those before it; the nodes, which stand at one place, some of one another."""
 PLACES = {

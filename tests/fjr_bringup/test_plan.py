@@ -12,6 +12,7 @@ from fjr_cli.app import app
 from fjr_kit.errors import InputError
 from fjr_validation.paper.levels import campaign_of
 from fjr_validation.paper.planner_check import checked
+from gap_diagnosis import Foresight
 
 run_command = CliRunner().invoke
 BAND = (1.0, 50.0)
@@ -93,3 +94,32 @@ def test_the_command_says_what_to_run(tmp_path: Path):
 def test_a_pilot_of_one_realization_is_refused(tmp_path: Path):
     with pytest.raises(InputError, match="two or more realizations of two or more periods"):
         pilot_of(simulate_level(campaign_of(7e-3, 1, 2)))
+
+
+def test_the_command_says_what_a_plan_could_show(tmp_path: Path):
+    grid = ["--set", "excitation.base_frequency_hz=1", "--set", "excitation.f_min_hz=1"]
+    plan = ["plan", "--level", "0.01", "--realizations", "2", *grid, "--effects", "backlash,delay"]
+    result = run_command(app, [*plan, "--out", str(tmp_path / "out")])
+    assert result.exit_code == 0, result.output
+    assert "backlash.half_gap_rad" in result.output and "Note: The noise" not in result.output
+    seen = Foresight.read(tmp_path / "out" / "plan.json")
+    assert {one.effect for one in seen.effects} == {"backlash", "delay"}
+    folder = str(tmp_path / "bags")
+    simulated = ["simulate", "--out", folder, *plan[1:5], *grid, "--workers", "1"]
+    assert run_command(app, simulated).exit_code == 0
+    result = run_command(app, ["plan", folder, "--nominal", "paper", "--effects", "delay"])
+    assert result.exit_code == 0 and "delay.time_s" in result.output
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["--target-db", "1"], "needs pilot bags"),
+        (["bags", "--level", "0.01"], "--level describes a plan"),
+        (["bags"], "Give --nominal"),
+        (["--set", "simulator.delay.time_s=0.001"], "switches an effect on"),
+    ],
+)
+def test_a_plan_that_says_too_little_or_too_much(arguments, sentence):
+    result = run_command(app, ["plan", *arguments])
+    assert result.exit_code == 2 and sentence in " ".join(result.output.split())

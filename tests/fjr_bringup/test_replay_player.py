@@ -258,3 +258,36 @@ def test_recorded_offers_become_publishers_as_in_rosbag2():
         default = to_offer(mixed)
         assert (default.reliability, default.depth) == (ReliabilityPolicy.RELIABLE, 10)
         assert default.durability == DurabilityPolicy.VOLATILE
+
+
+def test_another_programs_clock_keeps_the_time(start, peer, tmp_path):
+    from rosgraph_msgs.msg import Clock
+
+    write_bag(tmp_path / "bag", DESCRIBED)
+    clock = peer.node.create_publisher(Clock, "/clock", 10)
+    ears = Ears(peer)
+    heard = ears.signals["y"]
+    replayed = replay(start, tmp_path / "bag", "--follow-clock")
+    replayed.wait_for_text("Waiting for /clock, which nobody publishes.")
+    assert not heard
+
+    def tick(stamp_ns: int) -> None:
+        message = Clock()
+        message.clock.sec, message.clock.nanosec = divmod(stamp_ns, 10**9)
+        clock.publish(message)
+
+    begin_ns = 7_000_000_000
+    peer.spin_until(lambda: tick(begin_ns) or heard, "the first sample")
+    tick(begin_ns + 500 * MS)
+    peer.spin_until(lambda: len(heard) >= 501, "what is due by then")
+    for _ in range(20):
+        peer.spin_until(lambda: True, "a moment")
+    assert len(heard) == 501  # the clock stands, and so does the replay
+    peer.after_each_look = lambda: tick(begin_ns + 60_000 * MS)
+    assert ears.hear_out(replayed) == 0, replayed.output
+    assert [stamp_ns(message) for message in heard] == [k * MS for k in range(1, SAMPLES + 1)]
+
+
+def test_a_speed_without_bound_has_no_clock_to_follow(run, tmp_path):
+    done = run("replay", tmp_path / "bag", "--follow-clock", "--rate", "max")
+    assert done.exit_code == 2 and "does not go with --follow-clock" in done.stderr

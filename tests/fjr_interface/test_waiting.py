@@ -186,3 +186,14 @@ def test_a_node_refuses_to_publish_beside_somebody_elses(start, rig, letter, top
         rig.peer.spin_until(lambda: publisher.get_subscription_count() > 0, "the simulator")
     assert refused.exit_status() == 2
     assert f"error: The node /rig/peer publishes /rig/{topic} in ROS domain" in refused.output
+
+
+def test_a_second_publisher_is_named_where_the_lockstep_waits(start, rig):
+    nodes = by_hand(start, periods=20)
+    nodes["s"](), nodes["e"]()
+    controller = nodes["c"]()
+    rig.peer.spin_until(lambda: len(rig.torque) > 300, "torques")
+    rig.peer.node.create_publisher(rig.kind, "reference", rig.qos)
+    assert controller.interrupt() == 0
+    twice = "2 nodes publish /rig/reference (/rig/excitation, /rig/peer): end all but one of them"
+    wait_for(lambda: twice in fjr(start, "status"), "the name of the second publisher")

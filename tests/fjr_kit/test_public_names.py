@@ -22,6 +22,8 @@ PACKAGES = (
     "controller_node",
     "excitation_node",
     "fjr_bringup",
+    "fjr_compare",
+    "fjr_export",
     "fjr_interface",
     "fjr_records",
     "fjr_sim_node",

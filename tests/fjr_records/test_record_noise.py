@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfilt
 
-from fjr_interface.experiment import RecordDescription
+from fjr_interface.experiment import Experiment, RecordDescription
 from fjr_records.record_noise import band_lines, record_noise
 from fjr_records.records import Record, RecordSet
 
@@ -39,6 +39,22 @@ def test_repeats_show_noise_whatever_the_motion():
     motion = 1e-3 * rng.standard_normal(8000)  # as white as noise
     runs = [motion + STD * rng.standard_normal(8000) for _ in range(2)]
     found = record_noise(records(*runs, references=[motion, motion]))
+    assert found.source == "repeats" and found.std_rad == pytest.approx(STD, rel=0.15)
+
+
+def test_periods_show_noise_whatever_the_motion():
+    rng = np.random.default_rng(1)
+    period, length, count = 1e-3 * rng.standard_normal(2000), 2000, 4
+    experiment = Experiment.of(
+        "test", sample_rate_hz=RATE, samples_per_period=length, periods=count - 1,
+        transient_periods=1, amplitude_rad=1e-3, excited_harmonics=[1, 3],
+    )  # fmt: skip
+    position = np.tile(period, count) + STD * rng.standard_normal(count * length)
+    position[:length] *= 0.5  # the transient differs, and says nothing
+    whole = np.append(position, 0.0)  # and so does what is no whole period
+    found = record_noise(
+        RecordSet("test", RATE, (Record("r", experiment, None, whole * 0, whole, None),))
+    )
     assert found.source == "repeats" and found.std_rad == pytest.approx(STD, rel=0.15)
 
 

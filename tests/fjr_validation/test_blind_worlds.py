@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from fjr_kit.showing import size_showing
 from fjr_records import open_experiment
 from fjr_sim_node.effects import EFFECTS
 from fjr_validation.blind import excitations, rigs, stage
@@ -19,7 +20,7 @@ from fjr_validation.blind.causes import FAMILIES, compatible, drawers
 from fjr_validation.blind.draw import Scales
 from fjr_validation.blind.remainders import laws, scattered, wandering
 from fjr_validation.blind.second_laws import SETTINGS
-from fjr_validation.blind.visibility import FLOORS, Visibility, size_showing
+from fjr_validation.blind.visibility import FLOORS, Visibility
 from fjr_validation.blind.worlds import KINDS, kind_of, make_case
 from gap_diagnosis.model.nominal import read_nominal
 

@@ -64,7 +64,7 @@ def fit(effects: tuple[str, ...], held_chi2: float, converged: bool = True) -> F
          "misfit of 50.0 per degree of freedom, the best explanation, backlash, one of 30.0"),
         ((), [(("delay",), 4000.0), (("backlash",), 4500.0)],
          "misfit of 50.0 per degree of freedom, the best explanation, delay, one of 40.0"),
-        ((), [], "misfit of 50.0 per degree of freedom; none"),
+        ((), [], "misfit of 50.0 per degree of freedom; no effect"),
     ],
 )  # fmt: skip
 def test_the_note_on_what_is_left_pairs_each_name_with_its_own_misfit(best, candidates, words):

@@ -7,8 +7,8 @@ import pytest
 from gap_cases import simulate_case, vary
 
 from fjr_records.noise import noise_levels
-from gap_diagnosis.gates.bag_changes import TREND_FALSE_ALARM, bag_changes
-from gap_diagnosis.gates.bags_gate import bags_gate
+from gap_diagnosis.gates.bag_changes import TREND_FALSE_ALARM
+from gap_diagnosis.gates.bags_gate import bags_gate, periodic_changes
 from gap_diagnosis.investigation import investigate
 from gap_diagnosis.model.simulated_rig import Simulator
 from gap_diagnosis.outcome.diagnosis import Diagnosis
@@ -98,7 +98,9 @@ def test_scatter_is_seldom_taken_for_a_trend(case):
     alarms = 0
     for seed in range(20):
         recorded, _ = scattered(case, 0.02, 100 + seed, apart=bool(seed % 2))
-        changes = bag_changes(recorded, noise_levels(recorded), Simulator(recorded), case.truth)
+        changes = periodic_changes(
+            recorded, noise_levels(recorded), Simulator(recorded), case.truth
+        )
         alarms += any(trend.p_value < TREND_FALSE_ALARM for trend in changes.trends)
     assert alarms <= 2  # of a binomial of 2 %, more in 0.7 % of draws
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gap_diagnosis.outcome.diagnosis import Candidate, Diagnosis, EvidenceKind, Gap, Gaps
-from gap_diagnosis.outcome.verdict_words import ON, meaning
+from gap_diagnosis.outcome.verdict_words import ON, OUT_OF_TIME, meaning
 from gap_diagnosis.which.confidence import (
     COEFFICIENTS,
     NAMES,
@@ -81,3 +81,10 @@ def test_what_contains_the_named_effect_or_is_in_its_set_is_no_rival():
     assert features(diagnosis)[1] == lead
     diagnosis.ranking.append(candidate(["hysteresis"], 1.5))
     assert features(diagnosis)[1] == pytest.approx(np.log(1.5))
+
+
+def test_a_search_that_the_budget_ended_is_no_proof_that_nothing_explains_the_gap():
+    (unexplained,) = [d for d in VERDICTS if d.verdict == "unexplained"][:1]
+    cut = unexplained.model_copy(update={"notes": [*unexplained.notes, OUT_OF_TIME]})
+    assert "no explanation of the catalogue closes it" in meaning(unexplained)
+    assert "--budget" in meaning(cut) and "closes it" not in meaning(cut)

@@ -11,8 +11,7 @@ from gap_cases import simulate_case, with_other_noise, write_bags
 from fjr_records.noise import noise_levels
 from fjr_records.periodic import RecordedExperiment, read_experiment
 from fjr_sim_node.plant import PLANT
-from gap_diagnosis.gates.bag_changes import bag_changes
-from gap_diagnosis.gates.bags_gate import bags_gate
+from gap_diagnosis.gates.bags_gate import bags_gate, periodic_changes
 from gap_diagnosis.gates.gate_checks import check_gates
 from gap_diagnosis.gates.stationarity import PERIOD_Z_LIMIT, period_drift
 from gap_diagnosis.model import discretisation
@@ -87,7 +86,7 @@ def test_drift_of_friction_is_seen_within_bags_and_measured_between_them(per_s, 
     assert report.hint == "nonstationary"
     assert "stationary over periods" in [gate.name for gate in report.failures]
     noise, simulator = noise_levels(case.recorded), Simulator(case.recorded)
-    friction = bag_changes(case.recorded, noise, simulator, case.bare).trends[0]
+    friction = periodic_changes(case.recorded, noise, simulator, case.bare).trends[0]
     assert friction.slope_per_s == pytest.approx(per_s, rel=0.15)
     gate = bags_gate(case.recorded, noise, simulator, case.bare)
     assert not gate.passed and "friction" in gate.sentence

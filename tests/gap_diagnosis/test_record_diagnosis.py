@@ -14,6 +14,7 @@ from controller_node import pd_filtered
 from fjr_interface.bags.writer import BagWriter
 from fjr_interface.experiment import RecordDescription
 from fjr_interface.parameter_file import load_parameter_file
+from fjr_records.records import read_records
 from fjr_sim_node import effects as fx
 from fjr_sim_node.plant import PLANT, coefficients
 from fjr_sim_node.simulation.closed_loop import simulate
@@ -197,10 +198,32 @@ def test_a_short_single_record_names_nothing(run, tmp_path):
 
 
 def test_a_time_budget_ends_the_search_and_says_so(run, tmp_path):
-    folder = write_records(tmp_path / "rig", {}, levels=(1, 1), seconds=1.0)
-    found = diagnose(folder, read_nominal("paper"), effects=["torque_bias"], budget_s=0.0)
+    effects = {"gravity.torque_nm": GRAVITY_NM}
+    folder = write_records(tmp_path / "rig", effects, levels=(1, 1), seconds=1.0)
+    found = diagnose(folder, read_nominal("paper"), effects=["gravity"], budget_s=0.0)
     assert found.effects == [] and not found.ranking
     assert any("The time budget ended the search" in note for note in found.notes)
+
+
+def test_what_noise_explains_is_not_explained_further(tmp_path):
+    folder = write_records(tmp_path / "rig", {}, levels=(0, 0, 1, 1))
+    found = diagnose(folder, read_nominal("paper"), effects=["backlash", "torque_bias"])
+    assert found.verdict == "parameters_only" and found.causes == [] and not found.ranking
+    assert found.steps[-1].chi2_per_dof < 2.0
+
+
+def test_a_cause_that_acts_at_the_highest_level_alone_is_judged_by_that_level(tmp_path):
+    plain = write_records(tmp_path / "plain", {}, levels=(0, 0, 1, 1))
+    peaks = [np.abs(r.torque).max() for r in read_records(plain).records]
+    limit = 0.6 * min(peaks[2:])
+    assert max(peaks[:2]) < 0.8 * limit  # the lower level never reaches it
+    folder = write_records(
+        tmp_path / "rig", {"torque_saturation.limit_nm": limit}, levels=(0, 0, 1, 1)
+    )
+    found = diagnose(folder, read_nominal("paper"), effects=["torque_saturation", "load_friction"])
+    assert found.effects == ["torque_saturation"] and found.causes[0].present > 0.8
+    size = found.causes[0].parameters["torque_saturation.limit_nm"]
+    assert size.value == pytest.approx(limit, rel=0.02)
 
 
 def refused(done, *words):

@@ -9,20 +9,24 @@ from __future__ import annotations
 import importlib
 import runpy
 import sys
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import ModuleType
 from typing import Any
+from xml.etree import ElementTree
 
 import pytest
 import typer
-from workspace import PACKAGES, folder, manifest, setup_arguments
+from workspace import PACKAGES, ROOT, folder, manifest, setup_arguments
 
 from fjr_bringup.campaign.plan import Campaign
 from fjr_cli.app import app
 from fjr_interface import topics
-from fjr_interface.parameter_file import NODES
+from fjr_interface.parameter_file import NODES, load_parameter_file
 from fjr_interface.ros import runtime
+from fjr_kit.errors import InputError
+from fjr_sim_node.plant import PLANT
 
 FILES = sorted(folder("fjr_bringup").parent.glob("*/launch/*.launch.py"))
 
@@ -42,6 +46,25 @@ class DeclareLaunchArgument:
 @dataclass
 class LaunchConfiguration:
     variable_name: str
+
+    def perform(self, context: Launch) -> str:
+        return context.text(self)
+
+
+@dataclass
+class OpaqueFunction:
+    function: Callable[[Launch], list[Any]]
+
+
+@dataclass
+class Shutdown:
+    reason: str
+
+
+@dataclass
+class ParameterValue:
+    value: str
+    value_type: type
 
 
 @dataclass
@@ -65,6 +88,7 @@ class ExecuteProcess:
     cmd: list[Any]
     output: str
     sigterm_timeout: str = "5"
+    on_exit: list[Any] = field(default_factory=list)
 
 
 @dataclass(kw_only=True)
@@ -72,15 +96,23 @@ class Node:
     package: str
     executable: str
     output: str
+    namespace: str = ""
     parameters: list[Any] = field(default_factory=list)
+    remappings: list[Any] = field(default_factory=list)
+    on_exit: list[Any] = field(default_factory=list)
+
+
+class LaunchContext:
+    """What a launch file's functions are given; here the `Launch` itself."""
 
 
 STAND_IN = {
-    "launch": (LaunchDescription,),
-    "launch.actions": (DeclareLaunchArgument, ExecuteProcess),
+    "launch": (LaunchDescription, LaunchContext),
+    "launch.actions": (DeclareLaunchArgument, ExecuteProcess, OpaqueFunction, Shutdown),
     "launch.substitutions": (LaunchConfiguration, PathJoinSubstitution),
     "launch_ros": (),
     "launch_ros.actions": (Node,),
+    "launch_ros.parameter_descriptions": (ParameterValue,),
     "launch_ros.substitutions": (ExecutableInPackage, FindPackageShare),
 }
 
@@ -88,13 +120,19 @@ STAND_IN = {
 class Launch:
     """One launch file, resolved with the default or a stand-in for every argument."""
 
-    def __init__(self, file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def __init__(
+        self, file: Path, monkeypatch: pytest.MonkeyPatch, given: Mapping[str, str] | None = None
+    ) -> None:
+        self.given = given or {}
         for name, classes in STAND_IN.items():
             module = ModuleType(name)
             vars(module).update({each.__name__: each for each in classes})
             monkeypatch.setitem(sys.modules, name, module)
         self.entities = runpy.run_path(str(file))["generate_launch_description"]().entities
         self.arguments = {each.name: each for each in self.of(DeclareLaunchArgument)}
+        assert set(self.given) <= set(self.arguments)
+        for each in self.of(OpaqueFunction):
+            self.entities = [*self.entities, *each.function(self)]
 
     def of(self, kind: type) -> list[Any]:
         return [entity for entity in self.entities if isinstance(entity, kind)]
@@ -103,7 +141,10 @@ class Launch:
         """Return a substitution's text; the share folder of a package is its source folder."""
         if isinstance(value, LaunchConfiguration):
             argument = self.arguments[value.variable_name]
-            return self.text(argument.default_value or f"given {argument.name}")
+            if argument.name in self.given:
+                return self.given[argument.name]
+            absent = argument.default_value is None
+            return self.text(f"given {argument.name}" if absent else argument.default_value)
         if isinstance(value, PathJoinSubstitution):
             return "/".join(map(self.text, value.substitutions))
         if isinstance(value, FindPackageShare):
@@ -133,6 +174,8 @@ def test_something_is_started_and_every_argument_explained(launch: Launch) -> No
 
 def test_nodes_and_their_parameters_exist(launch: Launch, monkeypatch: pytest.MonkeyPatch) -> None:
     for node in launch.of(Node):
+        if node.package == "robot_state_publisher":
+            continue
         assert node.package in PACKAGES
         assert node.executable in executables(node.package, monkeypatch)
         group = importlib.import_module(f"{node.package}.node").PARAMETERS
@@ -172,8 +215,10 @@ def test_rosbag2_records_losslessly_what_the_nodes_publish(monkeypatch: pytest.M
     offered = {
         **dict.fromkeys(signals, runtime.SIGNAL_QOS),
         experiment: runtime.EXPERIMENT_QOS,
-        "/clock": runtime.CLOCK_QOS,
     }
+    clock = overrides.pop("/clock")  # offered best effort, of depth 1: too little for a recorder
+    assert (clock["reliability"], clock["depth"]) == ("best_effort", topics.SIGNAL_DEPTH)
+    assert runtime.CLOCK_QOS.reliability.name == "BEST_EFFORT"
     assert overrides == {
         topic: {
             "history": qos.history.name.lower(),
@@ -190,3 +235,69 @@ def test_rosbag2_records_losslessly_what_the_nodes_publish(monkeypatch: pytest.M
             awaited[0]
             == importlib.import_module(f"{node.package}.node").PARAMETERS["readers"].default
         )
+
+
+def test_a_file_that_is_not_there_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("rig", "rosbag2"):
+        file = folder("fjr_bringup") / f"launch/{name}.launch.py"
+        with pytest.raises(InputError, match=r"no_such\.yaml: cannot be read"):
+            Launch(file, monkeypatch, {"rig": "no_such.yaml"})
+
+
+def test_whatever_ends_ends_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("rig", "rosbag2"):
+        launch = Launch(folder("fjr_bringup") / f"launch/{name}.launch.py", monkeypatch)
+        for started in launch.of(Node) + launch.of(ExecuteProcess):
+            assert [type(each) for each in started.on_exit] == [Shutdown]
+
+
+def test_nodes_of_another_namespace_get_the_same_parameters(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    file = folder("fjr_bringup") / "launch/rig.launch.py"
+    given = {"namespace": "/cell/left", "joint_states": "/joint_states"}
+    launch = Launch(file, monkeypatch, given)
+    original = load_parameter_file(Launch(file, monkeypatch).of(Node)[0].parameters[0])
+    for node in launch.of(Node):
+        assert node.namespace == "/cell/left"
+        assert load_parameter_file(node.parameters[0], namespace="/cell/left") == original
+        assert node.remappings == [("link_position", "/joint_states")]
+
+
+def test_options_that_were_given_reach_the_command(monkeypatch: pytest.MonkeyPatch) -> None:
+    share = folder("fjr_cli") / "launch"
+    given = {"out": "report", "rate": "500", "duration": "5"}
+    (rehearse,) = Launch(share / "rehearsal.launch.py", monkeypatch, given).of(ExecuteProcess)
+    assert rehearse.cmd[4:] == ["--out", "report", "--rate", "500", "--duration", "5"]
+    given = {"rate": "2", "follow_clock": "true"}
+    (replay,) = Launch(share / "replay.launch.py", monkeypatch, given).of(ExecuteProcess)
+    assert replay.cmd[3:] == ["--rate", "2", "--follow-clock"]
+
+
+def test_the_description_of_the_rig_has_the_values_of_the_plant(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    urdf = folder("fjr_bringup") / "urdf/rig.urdf"
+    root = ElementTree.parse(urdf).getroot()
+    (joint,) = root.findall("joint")
+    assert joint.get("name") == topics.JOINT
+    values, inertial = PLANT.defaults(), root.find("link[@name='link']/inertial")
+    mass, offset = (
+        float(inertial.find("mass").get("value")),
+        float(inertial.find("origin").get("xyz").split()[0]),
+    )
+    about_middle = float(inertial.find("inertia").get("izz"))
+    assert about_middle + mass * offset**2 == pytest.approx(values["j"])
+    dynamics = joint.find("dynamics")
+    assert (float(dynamics.get("friction")), float(dynamics.get("damping"))) == (
+        values["fs"],
+        values["fv"],
+    )
+    named = {each.get("name") for each in root.findall("ros2_control/joint/*")}
+    assert named == {"position", "velocity", "effort"}
+    page = (ROOT / "docs/ros2_control.md").read_text(encoding="utf-8")
+    assert root.findtext("ros2_control/hardware/plugin") in page
+    file = folder("fjr_bringup") / "launch/rig.launch.py"
+    nodes = Launch(file, monkeypatch, {"description": str(urdf)}).of(Node)
+    assert nodes[-1].package == "robot_state_publisher"
+    assert nodes[-1].parameters[0]["robot_description"].value == urdf.read_text(encoding="utf-8")

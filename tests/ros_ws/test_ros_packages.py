@@ -12,7 +12,7 @@ from workspace import PACKAGES, ROOT, folder, manifest, setup_arguments
 
 EXTRAS = ("report", "dask")
 """Extras of the wheel that packages of the workspace name too."""
-OPTIONAL = {"control", "simulation_interfaces", "h5py"}
+OPTIONAL = {"cma", "control", "mujoco", "simulation_interfaces", "h5py"}
 WITH_PYDANTIC = {"pydantic_core", "typing_extensions"}
 PRODUCT = distribution("fjr-rig")
 REQUIRED = {

@@ -11,6 +11,7 @@ setup(
         ("share/ament_index/resource_index/packages", ["resource/fjr_bringup"]),
         ("share/fjr_bringup", ["package.xml"]),
         ("share/fjr_bringup/launch", glob("launch/*.launch.py")),
+        ("share/fjr_bringup/urdf", glob("urdf/*.urdf")),
         ("share/fjr_bringup/config", glob("config/*.*")),
         ("share/fjr_bringup/config/paper", glob("config/paper/*.yaml")),
     ],

@@ -1,0 +1,9 @@
+"""A parametric model of the BLA by maximum likelihood, with its uncertainty and its tests.
+
+Begin with `fitting`: a `results.result.Result` goes in, a `fit_types.Fit` comes out. `samples`
+weighs the lines of a BLA by their total covariance (`weights`); `rational` fits transfer functions
+in the orthonormal polynomials of `basis`, `physical` rigid, two-inertia and three-inertia joints,
+both as `sampled` with hold and delay; `uncertainty` gives intervals, `order_tests` judges the order
+and `order_search` chooses it. `fit_words` says it in sentences, `fit_output` writes all files, and
+`fit_control` hands the model to python-control.
+"""

@@ -1,0 +1,211 @@
+"""Records the realizations of a rig whose nodes were started by hand: `fjr record`."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from std_srvs.srv import Trigger
+
+from fjr_interface.bags.folder_names import bag_folder
+from fjr_interface.bags.writer import BagWriter, keep_whole_periods
+from fjr_interface.experiment import Experiment
+from fjr_interface.topics import NAMESPACE, stamp_ns
+from fjr_kit.errors import InputError
+from fjr_kit.stopping import Interruption
+
+from ..campaign.progress import CampaignProgress
+from .domain import own_domain, reach
+from .recorder import STAMP, STAMP_FORMAT, Recorder
+
+_POLL_S = 0.01
+_SAY_S = 3.0
+_ANSWER_S = 1.0
+
+
+class HandRecorder(Recorder):
+    """Makes a bag of each realization that is played from its first sample on, whatever it is.
+
+    What is under way when the recorder comes is passed over; one that is begun anew in its middle
+    is recorded anew.
+
+    Attributes:
+        late: whether samples were passed over because their realization began before.
+    """
+
+    def listen(self, out: Path) -> None:
+        """Expect the next realization; its bag comes into the folder `out`."""
+        self._out = out
+        self.samples = 0
+        self.newest_ns = [0] * len(self.signals)
+        self.late = False
+
+    @property
+    def experiment(self) -> Experiment:
+        """The description of the realization under way."""
+        return self._experiment
+
+    def cut(self) -> tuple[Path, int] | None:
+        """Close the bag under way with the whole periods that it has.
+
+        Returns:
+            Its folder and the number of periods after the transient; None if there is not one.
+        """
+        if self._writer is None or not self.samples:
+            self.abort()
+            return None
+        writer, self._writer = self._writer, None
+        writer.close()
+        periods = keep_whole_periods(writer.folder, self._experiment, self.samples)
+        return (writer.folder, periods) if periods else None
+
+    def _open(self, description: str) -> None:
+        experiment = Experiment.from_json(description, "topic experiment")
+        if self._writer is not None:
+            if experiment == self._experiment:
+                return  # begun anew: the stamps say where
+            self.abort()
+        self._start(experiment)
+
+    def _start(self, experiment: Experiment) -> None:
+        self._experiment = experiment
+        self._folder = bag_folder(self._out, experiment.level, experiment.realization)
+        self._stamps = experiment.stamps_ns.tolist()
+        self._first = _bytes(stamp_ns(1, experiment.sample_rate_hz))
+        self.samples = 0
+        self._writer = BagWriter(self._folder, experiment, signals=self.signals)
+
+    def _write_complete_samples(self, writer: BagWriter) -> None:
+        if self.samples and self._begun_anew():
+            self.abort()
+            self._start(self._experiment)
+        if not self.samples:
+            self._pass_over()
+        assert self._writer is not None
+        super()._write_complete_samples(self._writer)
+
+    def _ready(self) -> int:
+        return min(super()._ready(), len(self._stamps) - self.samples)
+
+    def _begun_anew(self) -> bool:
+        """Return whether a first sample has come where others of this realization were due."""
+        due = len(self._stamps) - self.samples
+        return any(
+            payload[STAMP] == self._first
+            for queue in self._queues
+            for payload, _ in zip(queue, range(due), strict=False)
+        )
+
+    def _pass_over(self) -> None:
+        """Leave out what came before the first sample of each signal."""
+        for queue in self._queues:
+            while queue and queue[0][STAMP] != self._first:
+                queue.popleft()
+                self.late = True
+
+
+def record_by_hand(
+    out: Path, count: int, progress: CampaignProgress, recorded: Callable[[Path], None]
+) -> None:
+    """Record realizations of the rig in the ROS domain of the environment.
+
+    Args:
+        out: folder of the bags.
+        count: how many realizations.
+        progress: where progress is shown.
+        recorded: called with every bag when it lies, audited, in its place.
+
+    Raises:
+        InputError: the environment names no domain, a sample was lost, the controller has tripped,
+            or the folder cannot be written.
+        KeyboardInterrupt: Ctrl-C; the whole periods of the realization under way are kept.
+    """
+    domain = own_domain()
+    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        node = rclpy.create_node("recorder", namespace=NAMESPACE)
+        recorder = HandRecorder(node)
+        progress.say(f"Recording in ROS domain {domain}; {reach()}.")
+        with Interruption() as interruption:
+            try:
+                for _ in range(count):
+                    _record_one(recorder, out, progress, interruption)
+                    _refuse_trip(recorder)
+                    bag = bag_folder(
+                        out, recorder.experiment.level, recorder.experiment.realization
+                    )
+                    recorder.finish()
+                    recorded(bag)
+            except KeyboardInterrupt:
+                kept = recorder.cut()
+                if kept is not None:
+                    progress.say(f"Ended after {kept[1]} whole periods, which are kept.")
+                    recorded(kept[0])
+                raise
+            finally:
+                recorder.abort()
+        node.destroy_node()
+    finally:
+        rclpy.try_shutdown()
+
+
+def _record_one(
+    recorder: HandRecorder, out: Path, progress: CampaignProgress, interruption: Interruption
+) -> None:
+    """Record until a realization is complete; say what is waited for."""
+    recorder.listen(out)
+    seen, said, heard = 0, "", time.monotonic()
+    while not recorder.complete:
+        samples = recorder.poll()
+        if samples != seen:
+            if not seen:
+                what = recorder.experiment
+                progress.describe(f"level {what.level}, realization {what.realization}")
+                progress.expect_s(what.samples / what.sample_rate_hz)
+            progress.update(samples / recorder.experiment.sample_rate_hz)
+            seen, heard = samples, time.monotonic()
+        if time.monotonic() - heard > _SAY_S and (now := _waits_for(recorder)) != said:
+            said = now
+            progress.say(now)
+        interruption.raise_if_asked()
+        time.sleep(_POLL_S)
+    progress.finish_run("recorded", 0.0)
+
+
+def _waits_for(recorder: HandRecorder) -> str:
+    if topic := recorder.unwritten:
+        return f"Waiting for a publisher of {topic}."
+    if not recorder.described:
+        return "Waiting for the description of a realization on /rig/experiment."
+    if recorder.samples:
+        return f"Sample {recorder.samples + 1} does not come; `fjr status` says who is missing."
+    again = "; `fjr reset` plays the realization from its beginning" * recorder.late
+    return f"Waiting for the first sample{again}."
+
+
+def _refuse_trip(recorder: HandRecorder) -> None:
+    """Refuse a realization in which the controller held the torque at zero."""
+    node: Node = rclpy.create_node("record_client", namespace=NAMESPACE)
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    client = node.create_client(Trigger, "controller/status")
+    until, future = time.monotonic() + _ANSWER_S, None
+    while time.monotonic() < until and not (future and future.done()):
+        executor.spin_once(timeout_sec=_POLL_S)
+        if future is None and client.service_is_ready():
+            future = client.call_async(Trigger.Request())
+    executor.shutdown()
+    node.destroy_node()
+    answer = future.result() if future and future.done() else None
+    if answer is not None and not answer.success:
+        recorder.abort()
+        raise InputError(f"The realization is not kept: the controller {answer.message}.")
+
+
+def _bytes(stamp: int) -> bytes:
+    return STAMP_FORMAT.pack(*divmod(stamp, 1_000_000_000))

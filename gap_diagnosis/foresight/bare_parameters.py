@@ -1,0 +1,111 @@
+"""How well an experiment would know the bare parameters: their Fisher information."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+
+from fjr_kit.errors import InputError
+from fjr_kit.showing import BareRefit
+from fjr_sim_node.plant import PLANT
+
+from ..model.simulated_rig import Model
+from ..which.scales import Scales
+from .foreseen import ForeseenParameter, Known
+
+_STEP = 1e-3
+_TIED = 0.3  # of the greatest share that a parameter has in the combination that is known worst
+_NOTHING = 1e-9  # of the greatest information: less is rounding
+_DIVERGED = 1e5
+
+
+class Sight(Protocol):
+    """What an experiment shows: of `periodic_sight` or `record_sight`."""
+
+    scales: Scales
+    noise_known: bool
+
+    @property
+    def levels(self) -> tuple[str, ...]:
+        """Names of the levels."""
+
+    def errors(self, models: Sequence[Model]) -> np.ndarray:
+        """Return errors of models over their standard deviation, float64 (models, errors)."""
+
+    def strength(self, change: np.ndarray) -> float:
+        """Return how far a change shows, over what the diagnosis needs to name an effect."""
+
+    def best_level(self, change: np.ndarray) -> int:
+        """Return the index of the level at which a change shows best."""
+
+    def fit_weights(self, errors: int) -> np.ndarray:
+        """Return how often each error counts in the diagnosis's fits, (errors,)."""
+
+
+def bare_refit(sight: Sight, nominal: Model) -> BareRefit:
+    """Return what the bare parameters can take over, with their slopes at the nominal ones.
+
+    Raises:
+        InputError: the nominal simulation diverges.
+    """
+    names = [name for name, value in nominal.plant.items() if value]
+    models = [
+        Model({**nominal.plant, name: nominal.plant[name] * (1.0 + step)}, {})
+        for name in names
+        for step in (_STEP, -_STEP)
+    ]
+    runs = sight.errors([nominal, *models])
+    if np.abs(runs).max() > _DIVERGED:
+        raise InputError(
+            "The nominal simulation diverges in this experiment; check its values and units."
+        )
+    return BareRefit(nominal.plant, names, ((runs[1::2] - runs[2::2]) / (2.0 * _STEP)).T)
+
+
+def parameters(sight: Sight, refit: BareRefit, tolerance: float) -> list[ForeseenParameter]:
+    """Return how well each bare parameter would be known; those at zero are not fitted.
+
+    Args:
+        sight: of the experiment.
+        refit: from `bare_refit`.
+        tolerance: relative standard error below which a parameter counts as identifiable.
+    """
+    weighed = refit.slopes * np.sqrt(sight.fit_weights(len(refit.slopes)))[:, None]
+    information = weighed.T @ weighed
+    own = np.diag(information)
+    shown = own > _NOTHING * own.max()
+    covariance = np.zeros_like(information)
+    covariance[np.ix_(shown, shown)] = np.linalg.pinv(
+        information[np.ix_(shown, shown)], rcond=1e-14, hermitian=True
+    )
+    found = []
+    for i, name in enumerate(refit.names):
+        error = math.sqrt(covariance[i, i]) if shown[i] else math.inf
+        alone = 1.0 / math.sqrt(own[i]) if shown[i] else math.inf
+        known: Known = (
+            "alone" if error < tolerance else "in combination" if alone < tolerance else "no"
+        )
+        found.append(
+            ForeseenParameter(
+                name=name,
+                unit=PLANT[name].unit,
+                nominal=refit.plant[name],
+                error_percent=100.0 * error,
+                others_known_percent=100.0 * alone,
+                identifiable=known,
+                tied_to=_tied(covariance, i, refit.names) if known == "in combination" else [],
+            )
+        )
+    return found
+
+
+def _tied(covariance: np.ndarray, index: int, names: Sequence[str]) -> list[str]:
+    """Return which parameters trade with one: those of the worst combination that holds it."""
+    values, vectors = np.linalg.eigh(covariance)
+    worst = vectors[:, int(np.argmax(values * vectors[index] ** 2))]
+    shares = np.abs(worst) / np.abs(worst).max()
+    order = np.argsort(-shares)
+    return [names[i] for i in order if i != index and shares[i] >= _TIED]

@@ -1,0 +1,101 @@
+"""Records: what a change of the model would change of the evidence in windows and lines."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from fjr_records.records import RecordSet
+
+from ..model.evidence import Evidence
+from ..model.simulated_rig import Model
+from ..which.scales import Scales
+from ..which.stepwise import LEAST_GAIN, NOTHING_LEFT
+
+RECORDS = 3
+"""Records of each level that are simulated: one for each purpose of a diagnosis."""
+
+
+class RecordSight:
+    """What records show.
+
+    Attributes:
+        scales: what is usual in them.
+        noise_known: whether their noise is known.
+    """
+
+    def __init__(self, records: RecordSet, nominal: Model, realizations: int | None = None) -> None:
+        """Take records.
+
+        Args:
+            records: at least those that stand for all.
+            nominal: the bare plant.
+            realizations: how many each level will have; None for those that are there.
+
+        Raises:
+            InputError: a controller that is described badly.
+        """
+        members = {at: [r for r in records.records if r.level == at] for at in records.levels}
+        chosen = [r for runs in members.values() for r in runs[:RECORDS]]
+        records = replace(records, records=tuple(chosen))
+        counts = [realizations or len(runs) for runs in members.values()]
+        self._stands_for = [max(count / RECORDS, 1.0) for count in counts]
+        self._evidence = Evidence(records, nominal.plant)
+        self.noise_known = self._evidence.noise.known
+        self.scales = Scales.of_record(
+            [r.position for r in chosen],
+            [r.torque for r in chosen],
+            records.sample_rate_hz,
+            self._evidence.lines * self._evidence.line_hz,
+            nominal.plant,
+        )
+        fitted = self._evidence.parts_for("fit")
+        judged = self._evidence.parts_for("select") or fitted
+        self._parts = (*fitted, *(part for part in judged if part not in fitted))
+        cell = self._evidence.cell_of(self._parts)
+        self._std = np.sqrt(self._evidence.floor(self._parts))[cell]
+        part = self._evidence.part_of(self._parts)
+        self._fitted = np.isin(part, fitted)
+        self._levels_of = np.array([p.level for p in self._evidence.parts])[part]
+        self._judged = np.isin(part, judged)
+        bands = self._evidence.bands
+        _, self._bins = np.unique(part[self._judged] * bands + cell[self._judged] % bands,
+                                  return_inverse=True)  # fmt: skip
+        self._count = len(judged)
+
+    @property
+    def levels(self) -> tuple[str, ...]:
+        """Names of the levels."""
+        return tuple(f"level {level}" for level in self._evidence.records.levels)
+
+    def errors(self, models: Sequence[Model]) -> np.ndarray:
+        """Return errors over their standard deviation, float64 (models, errors)."""
+        return self._evidence.errors(models, self._parts) / self._std
+
+    def strength(self, change: np.ndarray) -> float:
+        """Return how far a change shows, over what the diagnosis needs to name an effect.
+
+        Two things are needed (`stepwise`): without the effect, more than noise must be left, and an
+        unseen part must gain enough log-likelihood by it, of which each band has
+        n/2 ln(1 + mean square of the change over that of noise).
+        """
+        counts = np.bincount(self._bins)
+        squares = np.bincount(self._bins, change[self._judged] ** 2) / counts
+        gain = 0.5 * float(np.sum(counts * np.log1p(squares))) / self._count
+        left = float(np.mean(change[self._judged] ** 2))
+        return math.sqrt(min(gain / LEAST_GAIN, left / (NOTHING_LEFT - 1.0)))
+
+    def best_level(self, change: np.ndarray) -> int:
+        """Return the index of the level at which a change shows best."""
+        levels = self._evidence.records.levels
+        return int(np.argmax([np.mean(change[self._levels_of == level] ** 2) for level in levels]))
+
+    def fit_weights(self, errors: int) -> np.ndarray:
+        """Return how many parts of the fit each error stands for, (errors,)."""
+        place = [self._evidence.records.levels.index(level) for level in self._levels_of]
+        found = np.where(self._fitted, np.array(self._stands_for)[place], 0.0)
+        assert found.size == errors
+        return found
