@@ -21,9 +21,11 @@ BAG = "level_0_realization_000"
 
 
 def rig(start, speed: float | str = ".inf", **excitation: Any) -> None:
-    start.node("fjr_sim_node", speed=speed)
+    """Start the nodes so that the recorder misses no first sample and none that follows."""
+    start.node("fjr_sim_node", speed=speed, readers="controller,recorder")
     start.node("controller_node", readers="simulator,recorder")
-    start.node("excitation_node", **EXCITATION, **excitation, readers="controller,recorder")
+    paced = {"readers": "controller,recorder", "pace": "recorded"}
+    start.node("excitation_node", **EXCITATION, **excitation, **paced)
 
 
 def test_a_rig_by_hand_is_recorded_sample_for_sample(start, domain: int, tmp_path: Path):
@@ -53,6 +55,7 @@ def test_ctrl_c_keeps_whole_periods_and_a_late_recorder_waits(start, domain: int
 
     wait_for(has_played, "2500 samples")
     assert recorder.interrupt() == 130
+    assert "whole periods, which are kept" in recorder.output, recorder.output
     kept = BagReader(tmp_path / "cut" / BAG).experiment
     assert kept.transient_periods == 1 and 1 <= kept.periods < 9
     expected = run_realization(SIMULATOR.defaults(), described(periods=kept.periods))
