@@ -19,7 +19,7 @@ from .outcome.verdict_words import ROUNDING
 from .where.residual_map import ResidualMap
 from .which.attribution import Attribution
 from .which.confidence import confidence
-from .which.estimates import estimates, with_scatter
+from .which.estimates import estimates, moved_by_scatter, relative_scatter
 from .which.fits import Fit, Fitter
 
 NO_GAP = 2.0
@@ -72,6 +72,7 @@ def judge(
     if rounded:
         said.append(_rounding(recorded, held, best, signals, misfits, figures.position.refit))
     closed, bags = figures.position.closed, gates.gates[-1].bags
+    moved = moved_by_scatter(shown, fitter.train.runs(), relative_scatter(bags))
     return _sure(
         Diagnosis(
             verdict=verdict,
@@ -86,7 +87,7 @@ def judge(
             bags=bags,
             where=maps["refit" if misfits["refit"] > NO_GAP else "nominal"].places(),
             ranking=[_candidate(fit, size, refit, groups) for fit in attribution.candidates],
-            parameters=with_scatter(estimates(shown, groups), bags, len(fitter.train.which)),
+            parameters=estimates(shown, groups, moved),
             next_experiment=_next(recorded, noise_std, attribution, verdict),
             notes=said,
         )

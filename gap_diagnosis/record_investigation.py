@@ -11,20 +11,30 @@ from fjr_kit.errors import InputError
 from fjr_records.records import Record, RecordSet
 from fjr_sim_node import effects as fx
 
+from .gates.bag_deviations import GROUPS
 from .gates.bags_gate import as_bags, record_changes, scattering
 from .model.evidence import Evidence
 from .model.record_torque import CONTINUOUS, with_continuous_torque
 from .model.simulated_rig import Model
 from .notes import at_limits
-from .outcome.diagnosis import Diagnosis
+from .outcome.diagnosis import Bags, Diagnosis
 from .outcome.verdict_words import OUT_OF_TIME
 from .record_judgement import FEWEST_PARTS, Tested, judge_records, tested_causes
 from .which.catalogue import catalogue
 from .which.cell_fits import CellFit, CellFitter
+from .which.estimates import moved_by_scatter, relative_scatter
 from .which.search_space import TOLERANCE
 from .which.stepwise import Found, Stepwise, gain, stands_for
 
 Progress = Callable[[str], None]
+
+ASSUMED_SCATTER = 0.03
+"""Standard deviation of friction from run to run where the runs cannot show it, relative: that of
+drives is one to five percent."""
+ASSUMED = (
+    "How far friction scatters from run to run cannot be seen in these runs; the intervals allow "
+    f"for {100 * ASSUMED_SCATTER:.0f} %. Two runs more than levels that all move enough show it."
+)
 
 LEAST_SAMPLES = 64
 """Of each record: eight of the shortest windows."""
@@ -91,17 +101,15 @@ def investigate_records(
     fitter, refit, heard = _refitted(records, nominal, tolerance, progress)
     evidence = fitter.evidence
     found = Stepwise(fitter, names, progress, begun + _SEARCH_SHARE * budget_s).run(refit)
-    found, tested = _kept(fitter, found, progress)
+    progress("scatter from run to run")
+    bags, scatter, said = _run_scatter(fitter, found.best)
+    heard += said
+    found, tested = _kept(fitter, found, scatter, progress)
     progress("what may stand in for a cause")
     alternatives = {t.effect: _alternatives(fitter, found, t, names) for t in tested}
-    progress("scatter from run to run")
-    changes = record_changes(evidence, found.best.variance, found.best.model)
-    bags = None if changes is None else as_bags(changes, 0.0)
-    if changes is not None and (seen := scattering(changes)):
-        heard.append(f"What scatters from run to run: {seen}.")
     progress("judgement")
     notes = [*records.notes, *cut, *heard, *_notes(evidence, found)]
-    diagnosis = judge_records(fitter, model, found, tested, alternatives, bags, notes)
+    diagnosis = judge_records(fitter, model, found, tested, alternatives, bags, scatter, notes)
     return RecordInvestigation(evidence, model, found, tuple(tested), diagnosis)
 
 
@@ -170,7 +178,24 @@ def _first(record: Record, samples: int) -> Record:
     )
 
 
-def _kept(fitter: CellFitter, found: Found, progress: Progress) -> tuple[Found, list[Tested]]:
+def _run_scatter(
+    fitter: CellFitter, best: CellFit
+) -> tuple[Bags | None, dict[str, float], list[str]]:
+    """Return how far parameters scatter from run to run, seen or assumed, and sentences on it."""
+    changes = record_changes(fitter.evidence, best.variance, best.model)
+    if changes is None:
+        scatter = dict.fromkeys(GROUPS["friction"], ASSUMED_SCATTER)
+        if not moved_by_scatter(best, fitter.runs, scatter).any():
+            return None, {}, []
+        return None, scatter, [ASSUMED]
+    bags, seen = as_bags(changes, 0.0), scattering(changes)
+    said = [f"What scatters from run to run: {seen}."] if seen else []
+    return bags, relative_scatter(bags), said
+
+
+def _kept(
+    fitter: CellFitter, found: Found, scatter: Mapping[str, float], progress: Progress
+) -> tuple[Found, list[Tested]]:
     """Take out, one at a time, the causes that do not pass the tests beside the others.
 
     Where too little is held out, no cause is kept.
@@ -180,7 +205,7 @@ def _kept(fitter: CellFitter, found: Found, progress: Progress) -> tuple[Found, 
     steps, tested = list(found.steps), []
     while steps[-1].effects:
         progress(f"tests of {' + '.join(steps[-1].effects)}")
-        tested = tested_causes(fitter, steps[-1], steps[0], fitter.groups)
+        tested = tested_causes(fitter, steps[-1], steps[0], scatter)
         failed = [t for t in tested if not t.passed]
         if not failed:
             break

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-
-import numpy as np
 
 from .how_far.record_ledger import Ledger
 from .model.evidence import Evidence
@@ -26,7 +24,6 @@ from .outcome.diagnosis import (
     Verdict,
 )
 from .which.cell_fits import CellFit, CellFitter
-from .which.estimates import with_scatter
 from .which.presence import (
     LEAST_INVARIANCE_P,
     at_its_bound,
@@ -100,10 +97,17 @@ class Tested:
 
 
 def tested_causes(
-    fitter: CellFitter, fit: CellFit, refit: CellFit, groups: np.ndarray
+    fitter: CellFitter, fit: CellFit, refit: CellFit, scatter: Mapping[str, float]
 ) -> list[Tested]:
-    """Return every cause of a fit with its tests, all others fitted anew without it."""
-    estimates = cell_estimates(fit, groups)
+    """Return every cause of a fit with its tests, all others fitted anew without it.
+
+    Args:
+        fitter: of the search.
+        fit: with the causes.
+        refit: of the base parameters alone.
+        scatter: of parameters from run to run, see `moved_by_scatter`.
+    """
+    estimates = cell_estimates(fit, fitter, scatter)
     ledger = Ledger(fitter.evidence, fitter.select_parts)
     found = []
     for effect in fit.effects:
@@ -129,6 +133,7 @@ def judge_records(
     tested: Sequence[Tested],
     alternatives: dict[str, list[str]],
     bags: Bags | None,
+    scatter: Mapping[str, float],
     notes: Sequence[str],
 ) -> Diagnosis:
     """Return the diagnosis of records whose search has ended.
@@ -139,14 +144,14 @@ def judge_records(
         found: the steps of the search; its last fit holds the causes that are kept.
         tested: these causes with their tests.
         alternatives: for each of them what does as well in its place.
-        bags: how far parameters scatter from run to run.
+        bags: how far parameters scatter from run to run; None where that cannot be seen.
+        scatter: the same, or what is assumed instead, see `moved_by_scatter`.
         notes: sentences on the records.
     """
     evidence, best, refit = fitter.evidence, found.best, found.steps[0]
     ledger = Ledger(evidence)
     thin = len(evidence.parts_for("select")) < FEWEST_PARTS
-    fitted = {evidence.parts[p].record for p in fitter.fit_parts}
-    estimates = with_scatter(cell_estimates(best, fitter.groups), bags, len(fitted))
+    estimates = cell_estimates(best, fitter, scatter)
     causes = (
         [] if thin else [_cause(t, fitter, ledger, found, alternatives, estimates) for t in tested]
     )

@@ -102,6 +102,10 @@ class Misfit:
         band = np.tile(line * bands // self._lines, outputs)
         return (np.arange(len(self.which))[:, None] * bands + band).ravel()
 
+    def runs(self) -> np.ndarray:
+        """Return for each error the place of its realization in `which`, int (errors,)."""
+        return self.groups(bands=1)
+
     def chi2(self, model: Model) -> float:
         """Return the chi-square of one model, per degree of freedom."""
         errors = self.errors([model])[0]

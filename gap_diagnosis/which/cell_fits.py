@@ -64,6 +64,7 @@ class CellFitter:
         tolerance: how far one may be off, relative.
         fit_parts, select_parts: indices of parts.
         groups: (errors,), the stretch of time of each error of the fit, by its first part.
+        runs: (errors,), the record of each error of the fit.
     """
 
     def __init__(self, evidence: Evidence, nominal: Mapping[str, float], tolerance: float) -> None:
@@ -75,6 +76,8 @@ class CellFitter:
         self._cell = evidence.cell_of(self.fit_parts)
         self._floor = evidence.floor(self.fit_parts)
         self.groups = evidence.stretch_of(self.fit_parts)
+        of_part = np.array([part.record for part in evidence.parts])
+        self.runs = of_part[evidence.part_of(self.fit_parts)]
         evidence = self.evidence
         bands = evidence.cell_of(self.select_parts) % evidence.bands
         place = {part: k for k, part in enumerate(self.select_parts)}

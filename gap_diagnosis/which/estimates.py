@@ -18,6 +18,7 @@ from fjr_sim_node import effects as fx
 
 from ..gates.bag_deviations import SCATTERING
 from ..outcome.diagnosis import Bags, Estimate
+from .cell_fits import CellFit
 from .fits import Fit
 
 WIDENING: tuple[float, ...] = (1.0, 1.27, 1.92)
@@ -28,7 +29,7 @@ From the blind cases of `confidence`: 456, 776 and 216 parameters.
 _NORMAL_95 = 1.96
 
 
-def estimates(fit: Fit, groups: np.ndarray) -> dict[str, Estimate]:
+def estimates(fit: Fit, groups: np.ndarray, moved: np.ndarray | float = 0.0) -> dict[str, Estimate]:
     """Return all free parameters of a fit with their 95 % intervals, cut at their bounds.
 
     A gain of the torque is known only as far as the datasheet is: the data cannot tell it from base
@@ -37,6 +38,7 @@ def estimates(fit: Fit, groups: np.ndarray) -> dict[str, Estimate]:
     Args:
         fit: an explanation.
         groups: to which group each of its training errors belongs, `Misfit.groups`.
+        moved: what scatters from run to run moves its point, see `moved_by_scatter`.
     """
     solution, space = fit.solution, fit.space
     prior = np.zeros(solution.x.size)
@@ -44,6 +46,7 @@ def estimates(fit: Fit, groups: np.ndarray) -> dict[str, Estimate]:
         prior[: len(space.nominal)] = (_NORMAL_95 / np.log1p(space.tolerance)) ** 2
     std = standard_errors(solution.jacobian, solution.residuals, groups, prior)
     std[: len(space.nominal)] *= WIDENING[min(len(fit.effects), len(WIDENING) - 1)]
+    std = np.hypot(std, moved)
     ends = [np.clip(solution.x + sign * _NORMAL_95 * std, *space.bounds()) for sign in (-1, 1)]
     low, high = (space.model(end) for end in ends)
     found = {
@@ -104,27 +107,56 @@ def sure(fit: Fit, groups: np.ndarray) -> bool:
     )
 
 
-def with_scatter(found: dict[str, Estimate], bags: Bags | None, runs: int) -> dict[str, Estimate]:
-    """Return intervals of the mean over all runs that could have been recorded.
-
-    A fit to a few runs knows their mean; what parameters scatter from run to run comes on top, by
-    its variance over the number of runs.
+def relative_scatter(bags: Bags | None) -> dict[str, float]:
+    """Return the standard deviation from run to run of parameters of the bare plant, relative.
 
     Args:
-        found: parameters with the intervals of a fit.
         bags: how far each scatters; None where that is not known.
-        runs: how many runs the fit has seen.
     """
-    scatter = run_scatter(found, bags)
-    widened = dict(found)
-    for name, std in scatter.items():
-        e, added = found[name], _NORMAL_95 * std / np.sqrt(runs)
-        widened[name] = Estimate(
-            value=e.value,
-            low=max(e.value - np.hypot(e.value - e.low, added), min(e.low, 0.0)),
-            high=e.value + np.hypot(e.high - e.value, added),
-        )
-    return widened
+    if bags is None:
+        return {}
+    return {
+        part: estimate.value / 100.0
+        for name, estimate in bags.scatter_percent.items()
+        for part in SCATTERING[name]
+        if estimate.low > 0.0
+    }
+
+
+def moved_by_scatter(
+    fit: Fit | CellFit, runs: np.ndarray, scatter: Mapping[str, float]
+) -> np.ndarray:
+    """Return how far parameters that scatter from run to run move the point of a fit.
+
+    A fit to a few runs knows what these runs have in common. Each scattering parameter deviates in
+    each run by its own, and moves all parameters of the fit, to first order: the variances of all
+    deviations add up (random effects). A parameter that all runs show alike is itself off by its
+    scatter over the root of the number of runs.
+
+    Args:
+        fit: to errors in standard deviations.
+        runs: integers (errors,), the run of each of these errors.
+        scatter: standard deviations by names of the bare plant, relative. What the bare plant
+            lacks scatters as the parameter that it adds to.
+
+    Returns:
+        (parameters,), standard deviations in units of the point.
+    """
+    space, x, jacobian = fit.space, fit.solution.x, fit.solution.jacobian
+    change = np.zeros(x.size)
+    for k, name in enumerate((*space.nominal, *space.effects)):
+        if k < len(space.nominal):
+            change[k] = scatter.get(name, 0.0) if space.nominal[name] else 0.0
+        else:
+            change[k] = abs(x[k]) * scatter.get(fx.parameter(name).adds_to or "", 0.0)
+    on = np.flatnonzero(change)
+    variance = np.zeros(x.size)
+    if on.size:
+        inverse = np.linalg.pinv(jacobian.T @ jacobian, rcond=1e-14)
+        for run in np.unique(runs):
+            rows = jacobian[runs == run]
+            variance += np.sum((inverse @ (rows.T @ rows[:, on]) * change[on]) ** 2, axis=1)
+    return np.sqrt(variance)
 
 
 def run_scatter(found: Mapping[str, Estimate], bags: Bags | None) -> dict[str, float]:
@@ -136,14 +168,7 @@ def run_scatter(found: Mapping[str, Estimate], bags: Bags | None) -> dict[str, f
         found: parameters with their intervals.
         bags: how far each scatters; None where that is not known.
     """
-    if bags is None:
-        return {}
-    scattering = {
-        part: estimate.value / 100.0
-        for name, estimate in bags.scatter_percent.items()
-        for part in SCATTERING[name]
-        if estimate.low > 0.0
-    }
+    scattering = relative_scatter(bags)
     origin = {name: fx.parameter(name).adds_to if "." in name else name for name in found}
     return {
         name: abs(found[name].value) * scattering[part]

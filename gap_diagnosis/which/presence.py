@@ -8,7 +8,7 @@ Meinshausen 2016, JRSS-B 78(5)).
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from scipy import stats
@@ -17,7 +17,7 @@ from fjr_sim_node import effects as fx
 
 from ..outcome.diagnosis import Estimate
 from .cell_fits import CellFit, CellFitter
-from .estimates import standard_errors
+from .estimates import moved_by_scatter, standard_errors
 
 LEAST_INVARIANCE_P = 0.01
 _SAME = 0.05  # relative: sizes that differ by no more are the same, since friction scatters
@@ -25,15 +25,20 @@ _NORMAL_95 = 1.96
 _AT_BOUND = 1e-3  # relative
 
 
-def cell_estimates(fit: CellFit, groups: np.ndarray) -> dict[str, Estimate]:
+def cell_estimates(
+    fit: CellFit, fitter: CellFitter, scatter: Mapping[str, float]
+) -> dict[str, Estimate]:
     """Return all free parameters with their 95 % intervals, cut at their bounds.
 
     Args:
         fit: an explanation.
-        groups: to which part each of its errors belongs.
+        fitter: that made it.
+        scatter: standard deviations of parameters from run to run, see `moved_by_scatter`.
     """
     solution, space = fit.solution, fit.space
-    std = standard_errors(solution.jacobian, solution.residuals, groups)
+    std = standard_errors(solution.jacobian, solution.residuals, fitter.groups)
+    moved = moved_by_scatter(fit, fitter.runs, scatter)
+    std = np.hypot(std, moved)
     ends = [np.clip(solution.x + sign * _NORMAL_95 * std, *space.bounds()) for sign in (-1, 1)]
     low, high = (space.model(end) for end in ends)
     found = {

@@ -15,10 +15,12 @@ from fjr_sim_node import effects as fx
 from fjr_sim_node.plant import PLANT, coefficients
 from fjr_sim_node.simulation.closed_loop import simulate
 from gap_diagnosis import record_judgement
+from gap_diagnosis.gates.bag_deviations import GROUPS
 from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.model.simulated_rig import Model
 from gap_diagnosis.notes import at_limits
 from gap_diagnosis.outcome.diagnosis import Figure
+from gap_diagnosis.record_investigation import ASSUMED_SCATTER
 from gap_diagnosis.which.cell_fits import CellFitter
 from gap_diagnosis.which.presence import at_its_bound, beyond_zero, cell_estimates, invariance
 from gap_diagnosis.which.stepwise import Gain, gain
@@ -27,6 +29,7 @@ RATE, NOISE = 500.0, 2e-5
 LAW = pd_filtered.CONTROLLER.check({"sample_rate_hz": RATE})
 NOMINAL = {name: float(value) for name, value in PLANT.defaults().items()}
 BIAS = {"torque_bias.torque_nm": 1.5}
+SCATTER = dict.fromkeys(GROUPS["friction"], ASSUMED_SCATTER)
 
 
 def reference(seed: int, samples: int, rms_rad: float) -> np.ndarray:
@@ -39,10 +42,10 @@ def reference(seed: int, samples: int, rms_rad: float) -> np.ndarray:
     return rms_rad * signal / signal.std() * np.minimum(1.0, np.arange(samples) / 100.0)
 
 
-def records(effects=None, *, runs=1, seconds=8.0, known=True, scatter=0.0) -> RecordSet:
+def records(effects=None, *, runs=1, seconds=8.0, known=True, scatter=0.0, seed=5) -> RecordSet:
     """Return runs of the paper's rig at two levels; friction may scatter from run to run."""
     made, samples = [], int(seconds * RATE)
-    rng = np.random.default_rng(5)
+    rng = np.random.default_rng(seed)
     for level, rms in enumerate((0.02, 0.06)):
         for run in range(runs):
             factor = float(np.exp(scatter * rng.standard_normal()))
@@ -124,16 +127,31 @@ def test_a_cause_is_fitted_beside_friction_that_scatters():
     fitter, refit, fit = biased()
     found = gain(fitter, fit, refit)
     assert found.present and found.share == 1.0
-    bias = cell_estimates(fit, fitter.groups)["torque_bias.torque_nm"]
-    # Two runs of friction that scatters by 2 %: what that adds to the interval is told elsewhere.
-    assert abs(bias.value / 1.5 - 1.0) < 0.02 and bias.high - bias.low < 0.3
-    assert beyond_zero("torque_bias", cell_estimates(fit, fitter.groups))
+    found = cell_estimates(fit, fitter, SCATTER)
+    bias = found["torque_bias.torque_nm"]
+    assert bias.low <= 1.5 <= bias.high and bias.high - bias.low < 0.3
+    assert beyond_zero("torque_bias", found)
     assert not at_its_bound(fit, "torque_bias")
+
+
+def test_intervals_of_few_runs_allow_for_friction_that_scatters():
+    """Without that, the interval of fs holds the truth on five rigs of twelve."""
+    held = {"fs": 0, "fsm": 0, "torque_bias.torque_nm": 0}
+    truth = {**NOMINAL, **BIAS}
+    for seed in range(100, 110):
+        fitter = CellFitter(Evidence(records(BIAS, scatter=0.02, seed=seed), NOMINAL), NOMINAL, 0.1)
+        refit = fitter.refit()
+        fit = fitter.add(refit, "torque_bias", fitter.screening(refit, "torque_bias").proposals())
+        found = cell_estimates(fit, fitter, SCATTER)
+        for name in held:
+            held[name] += found[name].low <= truth[name] <= found[name].high
+    assert held["fs"] >= 8 and held["fsm"] >= 8, held
+    assert held["torque_bias.torque_nm"] >= 7, held
 
 
 def test_a_cause_without_which_nothing_of_the_gap_comes_back_is_not_present():
     fitter, refit, fit = biased()
-    (tested,) = record_judgement.tested_causes(fitter, fit, refit, fitter.groups)
+    (tested,) = record_judgement.tested_causes(fitter, fit, refit, SCATTER)
     closes_little = replace(tested, in_band=0.01)
     assert tested.passed and closes_little.present < 0.1 and not closes_little.passed
     assert 0.5 < tested.share.low < tested.share.high < 1.05
