@@ -1,7 +1,8 @@
 """How the numerical kernels are compiled: one cache for each state of their sources.
 
 numba invalidates a cached function when its own file changes, not when a function that it calls
-does; a cache folder named by a digest of all kernel sources can never be stale.
+or an option of the compiler does; a cache folder named by a digest of all kernel sources and of
+this file can never be stale.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ _KERNEL_PACKAGES = ("controller_node", "fjr_sim_node")
 
 def _cache_folder() -> Path:
     digest = hashlib.sha256(numba.__version__.encode())
-    for source in sources(_KERNEL_PACKAGES):
+    for source in (Path(__file__), *sources(_KERNEL_PACKAGES)):
         digest.update(source.read_bytes())
     base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     return base / "fjr_rig" / digest.hexdigest()[:16]
@@ -28,5 +29,7 @@ def _cache_folder() -> Path:
 if "NUMBA_CACHE_DIR" not in os.environ:
     numba.config.CACHE_DIR = str(_cache_folder())  # type: ignore[attr-defined]
 
-jit = numba.njit(cache=True, nogil=True)
-inlined = numba.njit(cache=True, nogil=True, forceinline=True)
+# The kernels allocate nothing. Without Numba's runtime no call counts references to its arrays,
+# which took more than half of the time of a rig with effects; a kernel that allocates is refused.
+jit = numba.njit(cache=True, nogil=True, _nrt=False)
+inlined = numba.njit(cache=True, nogil=True, forceinline=True, _nrt=False)

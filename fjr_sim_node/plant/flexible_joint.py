@@ -61,7 +61,7 @@ PLANT = ParameterGroup(
         symbol="k0",
         source="eq. 3",
     ),
-    Parameter("k1", 3000.0, "N m/rad3", "Cubic stiffness", 0.0, 1e10, symbol="k1", source="eq. 3"),
+    Parameter("k1", 3000.0, "N m/rad3", "Cubic stiffness", 0.0, 1e15, symbol="k1", source="eq. 3"),
 )
 """Physical parameters of the bare plant with the paper's values."""
 

@@ -250,30 +250,30 @@ def _balance(
     beyond = np.ones(omega.size)
     beyond[: window.size] -= window
     band_limited = states[1:3].copy()
+    missing, friction = np.empty(samples), np.empty(samples)
     for _ in range(REVERSAL_PASSES):
-        friction = _missing_torque(states, rest, p, e)[1]
+        _missing_torque(states, rest, p, e, missing, friction)
         lines = -np.fft.rfft(friction) * beyond / p[0]
         states[2] = band_limited[1] + np.fft.irfft(lines, samples)
         lines[1:] /= 1j * omega[1:]
         states[1] = band_limited[0] + np.fft.irfft(lines, samples)
-    return _missing_torque(states, rest, p, e)[0]
+    _missing_torque(states, rest, p, e, missing, friction)
+    return missing
 
 
 @jit
-def _missing_torque(states, rest, p, e):
-    """Return Jm th'' + friction - te - u, and the friction, for states (8, N) as in `_one`."""
-    out = np.empty((2, states.shape[1]))
-    for k in range(out.shape[1]):
+def _missing_torque(states, rest, p, e, missing, friction):
+    """Fill in Jm th'' + friction - te - u, and the friction, for states (8, N) as in `_one`."""
+    for k in range(missing.size):
         th, vth, ath, q, vq, built, flex, u = states[:, k]
         te = transmitted_torque(q, vq, th, vth, flex, p, e)
         balance = p[0] * ath + motor_viscous(vth, p, e) - motor_drive(th, vth, te, u, p, e)
         if abs(vth) > rest:
             direction = 1.0 if vth > 0.0 else -1.0
-            friction = direction * motor_level(abs(vth), direction, th, te, p, e)
+            torque = direction * motor_level(abs(vth), direction, th, te, p, e)
             if e is not None and has_motor_bristles(e):
-                friction = built + bristle_damping(built, abs(friction), direction, vth, e)
+                torque = built + bristle_damping(built, abs(torque), direction, vth, e)
         else:
             level = motor_level(0.0, 1.0 if balance < 0.0 else -1.0, th, te, p, e)
-            friction = min(max(-balance, -level), level)
-        out[0, k], out[1, k] = balance + friction, friction
-    return out
+            torque = min(max(-balance, -level), level)
+        missing[k], friction[k] = balance + torque, torque

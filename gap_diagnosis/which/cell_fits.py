@@ -116,6 +116,17 @@ class CellFitter:
             partial(self._residuals, parent.variance),
         )
 
+    def promise(self, screened: Screening, before: CellFit, parent: CellFit) -> float:
+        """Return what an effect promises beside a fit, by a screening beside another one.
+
+        Args:
+            screened: of the effect.
+            before: the fit beside which it was screened.
+            parent: the fit beside which it may be added.
+        """
+        ratio = np.sqrt(before.variance / parent.variance)[self._cell]
+        return screened.gain_beside(parent.solution, ratio)
+
     def add(self, parent: CellFit, effect: str, proposals: Sequence[Proposal]) -> CellFit | None:
         """Fit a parent's explanation with one effect more; None if no start promises anything."""
         best: CellFit | None = None

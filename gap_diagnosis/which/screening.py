@@ -60,17 +60,27 @@ class Screening:
             space_of: the space in which a seed is fitted.
             errors: error vectors of models, as the parent's residuals.
         """
+        self._seeds = seeds
         changes = errors([beside(model, seed) for seed in seeds]) - parent.residuals
         inverse = np.linalg.pinv(parent.jacobian, rcond=1e-6)
-        own = changes - (changes @ inverse.T) @ parent.jacobian.T
-        found = _candidates(parent, seeds, changes, own)
-        self._candidates = sorted(found, key=lambda candidate: -candidate.gain)
+        self._candidates = _candidates(parent, seeds, changes, inverse)
+        self._changes = changes.astype(np.float32)
         self._tries = _Tries(parent, model, inverse, space_of, errors)
 
     @property
     def gain(self) -> float:
         """By how much the best seed would lower the parent's cost, predicted linearly."""
         return self._candidates[0].gain
+
+    def gain_beside(self, other: Solution, ratio: np.ndarray) -> float:
+        """Return what `gain` would be beside another fit, if the seeds changed the motion alike.
+
+        Args:
+            other: where the other fit ended.
+            ratio: (errors,), standard deviations of the parent's errors over those of the other's.
+        """
+        inverse = np.linalg.pinv(other.jacobian, rcond=1e-6)
+        return _candidates(other, self._seeds, self._changes * ratio, inverse)[0].gain
 
     def proposals(self) -> list[Proposal]:
         """Return starting points, tried at several sizes, the most promising first.
@@ -145,12 +155,20 @@ def _candidates(
     parent: Solution,
     seeds: Sequence[Mapping[str, float]],
     changes: np.ndarray,
-    own: np.ndarray,
+    inverse: np.ndarray,
 ) -> list[_Candidate]:
     """Return one candidate for each seed, or for each pair of seeds a quarter turn apart.
 
-    `own` is what the base parameters can't follow of `changes`.
+    Args:
+        parent: of the seeds.
+        seeds: starting values.
+        changes: (seeds, errors), what each changes.
+        inverse: of the parent's Jacobian.
+
+    Returns:
+        The candidates, descending in gain.
     """
+    own = changes - (changes @ inverse.T) @ parent.jacobian.T  # what the parent cannot follow
     found = []
     for members in by_shape(seeds).values():
         weights, *_ = np.linalg.lstsq(own[members].T, -parent.residuals, rcond=1e-9)
@@ -170,7 +188,7 @@ def _candidates(
         phase = {name: float(np.arctan2(weights[1], weights[0]))}
         change = (weights @ changes[members]) / size
         found.append(_Candidate({**seeds[members[0]], **phase}, change, size, gain))
-    return found
+    return sorted(found, key=lambda candidate: -candidate.gain)
 
 
 def by_shape(seeds: Sequence[Mapping[str, float]]) -> dict[tuple, list[int]]:

@@ -16,9 +16,11 @@ from scipy import stats
 from fjr_sim_node import effects as fx
 
 from .cell_fits import CellFit, CellFitter
+from .screening import Screening
 
 MOST_CAUSES = 4
 _PROPOSED, _FITTED = 6, 4
+_AGAIN = 8  # effects without ripple that are screened beside a cause
 NOTHING_LEFT = 2.0
 """Mean squared error over noise below which noise explains what is left."""
 LEAST_GAIN = 1.0
@@ -117,6 +119,7 @@ class Stepwise:
             until: instant of `time.monotonic` after which nothing new is begun.
         """
         self._fitter, self._effects, self._progress, self._until = fitter, effects, progress, until
+        self._first: tuple[CellFit, dict[str, Screening]] | None = None
 
     def run(self, refit: CellFit) -> Found:
         """Search forward from the fit of the base parameters alone."""
@@ -143,17 +146,16 @@ class Stepwise:
     def _extended(self, parent: CellFit) -> list[CellFit]:
         """Return the parent with each promising effect more, best on unseen parts first."""
         effects = [e for e in self._effects if e not in parent.effects]
-        screened = {}
-        for effect in effects:
-            self._progress(f"{' + '.join((*parent.effects, effect))}, screened")
-            screened[effect] = self._fitter.screening(parent, effect)
-        hopeful = sorted(effects, key=lambda e: -screened[e].gain)[:_PROPOSED]
+        screened = self._screened(parent, effects)
+        hopeful = sorted(screened, key=lambda e: -screened[e].gain)[:_PROPOSED]
         proposals = {e: screened[e].proposals() for e in hopeful}
         ordered = sorted((e for e in hopeful if proposals[e]), key=lambda e: proposals[e][0][0])
         chosen = ordered[:_FITTED]
         alike = {p for e in chosen[:2] for p in fx.near_equivalents(e)} & set(effects)
         for effect in sorted(alike - set(chosen)):
-            proposals.setdefault(effect, screened[effect].proposals())
+            if effect not in proposals:
+                again = screened.get(effect) or self._fitter.screening(parent, effect)
+                proposals[effect] = again.proposals()
             chosen.append(effect)
         fits = []
         for number, effect in enumerate(chosen, 1):
@@ -162,6 +164,30 @@ class Stepwise:
             if fit is not None:
                 fits.append(fit)
         return sorted(fits, key=lambda fit: -self._gain(fit, parent).mean)
+
+    def _screened(self, parent: CellFit, effects: Sequence[str]) -> dict[str, Screening]:
+        """Return screenings beside a fit: of all effects the first time, then of those that count.
+
+        What a seed changes hardly depends on causes beside it, so the first changes say which
+        effects may gain beside others. Ripples are sought anew, since their period depends on what
+        is left.
+        """
+        if self._first is not None:
+            before, screened = self._first
+            promise = {
+                e: self._fitter.promise(screened[e], before, parent)
+                for e in effects
+                if not fx.EFFECTS[e].ripple
+            }
+            best = sorted(promise, key=lambda e: -promise[e])[:_AGAIN]
+            effects = [e for e in effects if e in best or e not in promise]
+        found = {}
+        for effect in effects:
+            self._progress(f"{' + '.join((*parent.effects, effect))}, screened")
+            found[effect] = self._fitter.screening(parent, effect)
+        if self._first is None:
+            self._first = parent, found
+        return found
 
     def _gain(self, after: CellFit, before: CellFit) -> Gain:
         return gain(self._fitter, after, before)
