@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import os
 from pathlib import Path
+from typing import Any
 
 import numba
 
@@ -31,5 +32,7 @@ if "NUMBA_CACHE_DIR" not in os.environ:
 
 # The kernels allocate nothing. Without Numba's runtime no call counts references to its arrays,
 # which took more than half of the time of a rig with effects; a kernel that allocates is refused.
-jit = numba.njit(cache=True, nogil=True, _nrt=False)
-inlined = numba.njit(cache=True, nogil=True, forceinline=True, _nrt=False)
+_OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "_nrt": False}
+
+jit = numba.njit(**_OPTIONS)
+inlined = numba.njit(**_OPTIONS, forceinline=True)
