@@ -41,7 +41,7 @@ FEWEST_PARTS = 6
 
 LEAST_PRESENT = 0.5
 """A cause that is there less often than not is not called present."""
-_DOUBTED = 0.2  # over what remains: a cause that closes such a share is there as often as not
+_DOUBTED = 0.7  # over what remains: a cause that closes such a share is there as often as not
 
 THIN = (
     "The records are too short or too few to hold anything out of the fits, so nothing is named: "

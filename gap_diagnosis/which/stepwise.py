@@ -26,8 +26,8 @@ NOTHING_LEFT = 2.0
 LEAST_GAIN = 1.0
 """Least mean gain of log-likelihood of an unseen part (nats)."""
 LEAST_SHARE = 0.75
-"""Least share of the parts in which anything changes that must gain."""
-MOST_P = 0.02
+"""Least share of the ranks that the parts which gain must hold."""
+MOST_P = 0.05
 """Greatest p-value of the signed-rank test that parts gain as often and as much as they lose."""
 TIED_SHARE = 0.15
 """An effect stands for another if it is behind by less than this share of the other's gain..."""
@@ -47,7 +47,8 @@ class Gain:
     Attributes:
         mean: mean over unseen parts of the log-likelihood gained (nats).
         without_best: the same without the part that gains most.
-        share: share of parts that gain, of those in which anything changes.
+        share: of the parts that gain in the sum of ranks, ranked by how much each changes: a part at
+            rest shows little but where friction happened to stop the motion.
         p: p-value of Wilcoxon's signed-rank test of these parts against no gain.
     """
 
@@ -70,10 +71,11 @@ def gain(fitter: CellFitter, after: CellFit, before: CellFit) -> Gain:
         return Gain(float(difference.mean()), 0.0, 0.0, 1.0)
     most = int(np.argmax(difference))
     telling = difference[np.abs(difference) >= _NEUTRAL * np.abs(difference).max()]
+    ranks = stats.rankdata(np.abs(telling))
     return Gain(
         float(difference.mean()),
         float(np.delete(difference, most).mean()),
-        float(np.mean(telling > 0.0)),
+        float(ranks[telling > 0.0].sum() / ranks.sum()),
         float(stats.wilcoxon(telling, alternative="greater").pvalue),
     )
 
