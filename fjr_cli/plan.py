@@ -11,6 +11,7 @@ from .campaign_options import CampaignOptions, Rig
 from .cli_errors import reports_errors
 from .described_runs import RunOptions
 from .option_groups import takes_groups
+from .result_options import datasheet_tolerance, effect_names, names_in
 
 if TYPE_CHECKING:
     from fjr_bringup.campaign.plan import Campaign
@@ -65,22 +66,9 @@ def plan(
         ),
     ] = None,
     effects: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME,NAME,...",
-            help="Look at these effects only; default: the catalogue.",
-            rich_help_panel=SHOWN,
-        ),
+        str | None, effect_names("Look at these effects only; default: the catalogue.", SHOWN)
     ] = None,
-    tolerance: Annotated[
-        float,
-        typer.Option(
-            min=0.001,
-            max=0.5,
-            help="How far a datasheet value may be off, relative.",
-            rich_help_panel=SHOWN,
-        ),
-    ] = 0.1,
+    tolerance: Annotated[float, datasheet_tolerance(SHOWN)] = 0.1,
     out: Annotated[
         Path | None,
         typer.Option(metavar="FOLDER", help="Write plan.json there.", rich_help_panel=SHOWN),
@@ -114,7 +102,7 @@ def plan(
         _propose(folder, target_db, band, rig_time, resolution)
     if folder is not None and nominal is None:
         return
-    asked = None if effects is None else [name.strip() for name in effects.split(",")]
+    asked = names_in(effects)
     if folder is not None:
         _foresee_bags(folder, str(nominal), tolerance, asked, out)
         return
