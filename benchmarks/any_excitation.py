@@ -19,8 +19,9 @@ from machine import describe
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 import rig_records as rigs
 
-from bla_analyzer.bla.arbitrary import ORDER, arbitrary_bla, run_of
+from bla_analyzer.bla.arbitrary import arbitrary_bla, run_of
 from bla_analyzer.bla.local_fit import Run, fit_window
+from bla_analyzer.bla.windows import ORDER
 from fjr_kit.errors import InputError
 from fjr_sim_node.theory.statistical_linearisation import linearise
 

@@ -23,6 +23,7 @@ sys.path[:0] = [str(HERE), str(HERE.parent)]
 import machine  # noqa: E402
 
 from bla_analyzer.bla.robust import robust_bla  # noqa: E402
+from bla_analyzer.fit.likelihood import Task  # noqa: E402
 from bla_analyzer.fit.rational import fit_rational  # noqa: E402
 from bla_analyzer.fit.sampled import Sampled  # noqa: E402
 from bla_analyzer.fit.samples import Samples, samples_of  # noqa: E402
@@ -86,7 +87,7 @@ def bla_samples(u: np.ndarray, y: np.ndarray) -> Samples:
 
 def own(samples: Samples, order: int):
     seen = Sampled.of(samples.frequency_hz, RATE, "z")
-    model = fit_rational(samples, seen, order - 1, order)
+    model = fit_rational(Task(samples, seen), order - 1, order)
     return model.response()[0][:, 0], seen.roots(model.lower.roots(model.a))
 
 

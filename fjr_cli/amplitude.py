@@ -10,16 +10,19 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .campaign_options import Realizations, Rig, Seed, Set, described_campaign
+from .campaign_options import Rig
 from .cli_errors import reports_errors
-from .search_options import Graph, PositionLimit, TorqueLimit, bench_of, tell
+from .option_groups import takes_groups
+from .search_options import SearchOptions, tell
 
 if TYPE_CHECKING:
     from fjr_bringup.design.amplitude import Search
 
 
 @reports_errors(kept="bags that were recorded are kept, and the same command goes on")
+@takes_groups
 def amplitude(
+    *,
     folder: Annotated[
         Path | None,
         typer.Argument(help="Bags of several levels, recorded on any rig; without it, measure."),
@@ -30,12 +33,7 @@ def amplitude(
     ] = Path("experiments/amplitude"),
     lowest: Annotated[float, typer.Option(help="Lowest amplitude of a line in rad.")] = 1e-3,
     highest: Annotated[float, typer.Option(help="Highest amplitude of a line in rad.")] = 1e-1,
-    torque_limit: TorqueLimit = math.inf,
-    position_limit: PositionLimit = math.inf,
-    realizations: Realizations = None,
-    seed: Seed = None,
-    settings: Set = None,
-    graph: Graph = False,
+    options: SearchOptions,
 ) -> None:
     """Find the amplitude at which the BLA is nearest to the linear plant, from measured distortion.
 
@@ -45,7 +43,7 @@ def amplitude(
     from fjr_bringup.design.amplitude import Limits, bag_levels, evaluate, search, within
     from fjr_kit.folder_lock import locked_folder
 
-    limits = Limits(torque_limit, position_limit)
+    limits = Limits(options.torque_limit, options.position_limit)
     if folder is not None:
         levels = bag_levels(folder)
         usable = within(levels, limits)
@@ -53,11 +51,11 @@ def amplitude(
         ended_by = "the torque or position limit" if limited else "the highest level of the bags"
         found = evaluate(usable, ended_by)
     else:
-        campaign = described_campaign(rig, settings, realizations=realizations, seed=seed)
-        with locked_folder(out) if graph else nullcontext():
+        campaign = options.campaign(rig)
+        with locked_folder(out) if options.graph else nullcontext():
             found = search(
                 campaign,
-                bench_of(graph, out),
+                options.bench(out),
                 lowest_rad=lowest,
                 highest_rad=highest,
                 limits=limits,

@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from .cli_errors import reports_errors
-from .record_options import MapSignals, Periods, Resample, SamplesPerPeriod, TransientPeriods
+from .option_groups import takes_groups
+from .record_options import MapSignals, PeriodOptions, Resample
+from .result_options import results_folder
 
 if TYPE_CHECKING:
     from fjr_interface.resampling.accuracy import Resampling
@@ -26,12 +28,11 @@ class MethodChoice(str, Enum):
 
 
 @reports_errors(kept="nothing was written")
+@takes_groups
 def analyze(
+    *,
     folder: Annotated[Path, typer.Argument(help="Experiment folder with bags, or one bag.")],
-    out: Annotated[
-        Path | None,
-        typer.Option(metavar="FOLDER", help="Folder of the results; default: FOLDER/analysis."),
-    ] = None,
+    out: Annotated[Path | None, results_folder("FOLDER/analysis")] = None,
     method: Annotated[
         MethodChoice | None,
         typer.Option(
@@ -49,9 +50,7 @@ def analyze(
             "paper for bags that describe a campaign of this rig, else none.",
         ),
     ] = None,
-    samples_per_period: SamplesPerPeriod = None,
-    transient_periods: TransientPeriods = None,
-    periods: Periods = None,
+    periods: PeriodOptions,
     resample: Resample = None,
     write_report: Annotated[
         bool,
@@ -62,9 +61,7 @@ def analyze(
 ) -> None:
     """Estimate BLA, noise and nonlinear distortion from bags of any excitation."""
     from fjr_interface.resampling.accuracy import Resampling
-    from fjr_records.experiment_bag import Override
 
-    override = Override(samples_per_period, transient_periods, periods)
     resampling = Resampling.parse(resample) if resample else None
     report = analyze_folder(
         folder,
@@ -72,7 +69,7 @@ def analyze(
         method,
         signal_map or [],
         nominal,
-        override,
+        periods.override(),
         resampling,
         write_report=write_report,
     )

@@ -2,8 +2,9 @@
 
 A module holds the options of its command and a thin body, which imports what it needs when it is
 called, so that `fjr --help` is quick, and prints what came of it. Errors become one sentence by
-`cli_errors`. Options that several commands have stand in `campaign_options`, `record_options`,
-`search_options` and `worker_options`.
+`cli_errors`. Options that several commands have stand in `campaign_options`, `described_runs`,
+`record_options`, `result_options`, `search_options` and `worker_options`; where commands have a
+whole group of them, as a dataclass that `option_groups` unfolds.
 """
 
 from __future__ import annotations

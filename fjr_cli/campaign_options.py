@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -45,6 +47,33 @@ DryRun = Annotated[
     bool,
     typer.Option("--dry-run", help="Only check everything, and say what it takes: time and disk."),
 ]
+
+
+@dataclass(frozen=True)
+class CampaignOptions:
+    """Options of `plan`, `run` and `simulate`: what is played."""
+
+    level: Levels = None
+    realizations: Realizations = None
+    periods: Periods = None
+    transient_periods: TransientPeriods = None
+    seed: Seed = None
+    settings: Set = None
+
+    def campaign(
+        self, rig: Path | None, out: Path | None = None, without: Collection[str] = ()
+    ) -> Campaign:
+        """Return the campaign, see `described_campaign`; `without`: settings that are not its."""
+        return described_campaign(
+            rig,
+            [setting for setting in self.settings or [] if setting not in without],
+            out,
+            amplitudes_rad=tuple(self.level) if self.level else None,
+            realizations=self.realizations,
+            periods=self.periods,
+            transient_periods=self.transient_periods,
+            seed=self.seed,
+        )
 
 
 def described_campaign(

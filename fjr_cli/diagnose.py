@@ -9,11 +9,15 @@ from typing import Annotated
 import typer
 
 from .cli_errors import reports_errors
-from .record_options import MapSignals, Periods, Resample, SamplesPerPeriod, TransientPeriods
+from .option_groups import takes_groups
+from .record_options import MapSignals, PeriodOptions, Resample
+from .result_options import datasheet_tolerance, effect_names, names_in, results_folder
 
 
 @reports_errors(kept="nothing was written, and an earlier diagnosis in the folder is as it was")
+@takes_groups
 def diagnose(
+    *,
     folder: Annotated[
         Path, typer.Argument(metavar="REAL_FOLDER", help="Experiment folder with the rig's bags.")
     ],
@@ -25,21 +29,10 @@ def diagnose(
             "/rig/simulator, or paper for the paper's values.",
         ),
     ],
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FOLDER", help="Folder of the results; default: REAL_FOLDER/diagnosis."
-        ),
-    ] = None,
-    tolerance: Annotated[
-        float,
-        typer.Option(min=0.001, max=0.5, help="How far a datasheet value may be off, relative."),
-    ] = 0.1,
+    out: Annotated[Path | None, results_folder("REAL_FOLDER/diagnosis")] = None,
+    tolerance: Annotated[float, datasheet_tolerance()] = 0.1,
     effects: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME,NAME,...", help="Look for these effects only; default: the catalogue."
-        ),
+        str | None, effect_names("Look for these effects only; default: the catalogue.")
     ] = None,
     budget: Annotated[
         float | None,
@@ -55,9 +48,7 @@ def diagnose(
     ] = False,
     signal_map: MapSignals = None,
     resample: Resample = None,
-    samples_per_period: SamplesPerPeriod = None,
-    transient_periods: TransientPeriods = None,
-    periods: Periods = None,
+    periods: PeriodOptions,
 ) -> None:
     """Tell why rig and simulation differ: where, by which effects, how far they close the gap."""
     from fjr_kit.installed import require_report_extra
@@ -69,7 +60,6 @@ def diagnose(
     from fjr_interface.resampling.accuracy import Resampling
     from fjr_kit.folder_lock import locked_folder
     from fjr_kit.invocation import call_date, command_line
-    from fjr_records.experiment_bag import Override
     from fjr_records.periodic import RecordedExperiment
     from gap_diagnosis.any_record import investigate_any, read_any
     from gap_diagnosis.model.nominal import read_nominal, refuse_wrong_units
@@ -79,17 +69,15 @@ def diagnose(
     from .diagnosis_summary import print_summary
     from .stage_progress import StageProgress
 
-    override = Override(samples_per_period, transient_periods, periods)
     resampling = Resampling.parse(resample) if resample else None
     values = read_nominal(nominal)
     sources = SignalMap.parse(signal_map or [])
-    asked = None if effects is None else [name.strip() for name in effects.split(",")]
     place = out or folder / "diagnosis"
     find_bags(folder)
     with locked_folder(place), StageProgress(transient=True) as progress:
         progress.describe("reading bags")
         recorded = read_any(
-            folder, sources, override=override, resampling=resampling, as_record=as_record
+            folder, sources, override=periods.override(), resampling=resampling, as_record=as_record
         )
         if isinstance(recorded, RecordedExperiment):
             warning = refuse_wrong_units(recorded, values, nominal)
@@ -99,7 +87,7 @@ def diagnose(
             recorded,
             values,
             tolerance=tolerance,
-            effects=asked,
+            effects=names_in(effects),
             budget_s=math.inf if budget is None else budget,
             progress=progress.describe,
         )

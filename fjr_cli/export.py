@@ -10,6 +10,7 @@ import typer
 
 from .cli_errors import reports_errors
 from .record_options import MapSignals
+from .result_options import effect_names, names_in, results_folder
 
 if TYPE_CHECKING:
     from fjr_export.result import Export
@@ -39,12 +40,7 @@ def export(
             "python-control, linear; simscape-m: Simscape component and MATLAB script.",
         ),
     ],
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FOLDER", help="Folder of the results; default: TARGET beside PARAMETERS."
-        ),
-    ] = None,
+    out: Annotated[Path | None, results_folder("TARGET beside PARAMETERS")] = None,
     replay: Annotated[
         Path | None,
         typer.Option(
@@ -53,10 +49,7 @@ def export(
             "the error.",
         ),
     ] = None,
-    without: Annotated[
-        str | None,
-        typer.Option(metavar="NAME,NAME,...", help="Effects to leave out."),
-    ] = None,
+    without: Annotated[str | None, effect_names("Effects to leave out.")] = None,
     signal_map: MapSignals = None,
 ) -> None:
     """Export the joint to a simulator or control tool, and replay recorded runs in it."""
@@ -68,14 +61,13 @@ def export(
     from .stage_progress import StageProgress
 
     place = out or parameters.parent / to.value
-    names = [name.strip() for name in (without or "").split(",") if name.strip()]
     sources = SignalMap.parse(signal_map or [])
     with locked_folder(place), StageProgress(transient=True) as progress:
         made = export_joint(
             parameters,
             to.value,  # type: ignore[arg-type]
             place,
-            without=names,
+            without=[name for name in names_in(without) or [] if name],
             replay=replay,
             signal_map=sources,
             progress=progress.describe,

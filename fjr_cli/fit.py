@@ -11,7 +11,8 @@ import typer
 
 from .analyze import MethodChoice
 from .cli_errors import reports_errors
-from .record_options import MapSignals, Periods, Resample, SamplesPerPeriod, TransientPeriods
+from .option_groups import takes_groups
+from .record_options import MapSignals, PeriodOptions, Resample
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -46,7 +47,9 @@ class HoldChoice(str, Enum):
 
 
 @reports_errors(kept="nothing was written, and an earlier fit in the folder is as it was")
+@takes_groups
 def fit(
+    *,
     source: Annotated[
         Path,
         typer.Argument(
@@ -100,9 +103,7 @@ def fit(
         typer.Option(help="How bags are analyzed, as by fjr analyze.", show_default=False),
     ] = None,
     signal_map: MapSignals = None,
-    samples_per_period: SamplesPerPeriod = None,
-    transient_periods: TransientPeriods = None,
-    periods: Periods = None,
+    periods: PeriodOptions,
     resample: Resample = None,
     write_report: Annotated[
         bool,
@@ -113,7 +114,6 @@ def fit(
     from fjr_interface.resampling.accuracy import Resampling
     from fjr_kit.errors import InputError
     from fjr_kit.installed import require_report_extra
-    from fjr_records.experiment_bag import Override
 
     if write_report:
         require_report_extra()
@@ -130,8 +130,7 @@ def fit(
 
     orders, seconds = _order(order), _delay(delay)
     analyzed = _analyzed(source)
-    override = Override(samples_per_period, transient_periods, periods)
-    if analyzed is not None and (method or signal_map or resample or override != Override()):
+    if analyzed is not None and (method or signal_map or resample or periods != PeriodOptions()):
         raise InputError(
             f"{source}: is analyzed already; give the options on bags to fjr analyze, or name the "
             "bags."
@@ -142,7 +141,7 @@ def fit(
             source,
             method,
             signal_map or [],
-            override,
+            periods.override(),
             Resampling.parse(resample) if resample else None,
             progress,
         )

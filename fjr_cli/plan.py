@@ -3,24 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .campaign_options import (
-    Levels,
-    Periods,
-    Realizations,
-    Rig,
-    Seed,
-    Set,
-    TransientPeriods,
-    described_campaign,
-)
+from .campaign_options import CampaignOptions, Rig
 from .cli_errors import reports_errors
-from .described_runs import Controller, Duration, Record, described_runs, own_settings
+from .described_runs import RunOptions
+from .option_groups import takes_groups
+from .result_options import datasheet_tolerance, effect_names, names_in
 
 if TYPE_CHECKING:
+    from fjr_bringup.campaign.plan import Campaign
     from fjr_records.periodic import RecordedExperiment
     from fjr_records.records import RecordSet
 
@@ -29,7 +23,9 @@ SHOWN = "What it could show (with --nominal, or without FOLDER)"
 
 
 @reports_errors(kept="nothing was written")
+@takes_groups
 def plan(
+    *,
     folder: Annotated[
         Path | None,
         typer.Argument(
@@ -70,36 +66,16 @@ def plan(
         ),
     ] = None,
     effects: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME,NAME,...",
-            help="Look at these effects only; default: the catalogue.",
-            rich_help_panel=SHOWN,
-        ),
+        str | None, effect_names("Look at these effects only; default: the catalogue.", SHOWN)
     ] = None,
-    tolerance: Annotated[
-        float,
-        typer.Option(
-            min=0.001,
-            max=0.5,
-            help="How far a datasheet value may be off, relative.",
-            rich_help_panel=SHOWN,
-        ),
-    ] = 0.1,
+    tolerance: Annotated[float, datasheet_tolerance(SHOWN)] = 0.1,
     out: Annotated[
         Path | None,
         typer.Option(metavar="FOLDER", help="Write plan.json there.", rich_help_panel=SHOWN),
     ] = None,
     rig: Rig = None,
-    level: Levels = None,
-    realizations: Realizations = None,
-    periods: Periods = None,
-    transient_periods: TransientPeriods = None,
-    seed: Seed = None,
-    settings: Set = None,
-    controller: Controller = None,
-    record: Record = None,
-    duration: Duration = None,
+    options: CampaignOptions,
+    described: RunOptions,
 ) -> None:
     """Say what an experiment could show before rig time is spent, or what it takes.
 
@@ -110,16 +86,13 @@ def plan(
     """
     from fjr_kit.errors import InputError
 
-    planned = {
-        "--rig": rig, "--level": level, "--realizations": realizations, "--periods": periods,
-        "--transient-periods": transient_periods, "--seed": seed, "--set": settings,
-        "--controller": controller, "--record": record, "--duration": duration,
-    }  # fmt: skip
+    planned = {"rig": rig, **vars(options), **vars(described)}
     given = [name for name, value in planned.items() if value is not None]
     if folder is None and target_db is not None:
         raise InputError("--target-db needs pilot bags, by which noise and distortion are known.")
     if folder is not None and given:
-        raise InputError(f"{given[0]} describes a plan; leave it out, or leave {folder} out.")
+        name = {"settings": "set"}.get(given[0], given[0].replace("_", "-"))
+        raise InputError(f"--{name} describes a plan; leave it out, or leave {folder} out.")
     if folder is not None and target_db is None and nominal is None:
         raise InputError(
             "Give --nominal for what the bags could show, --target-db for what a BLA takes, or "
@@ -129,27 +102,13 @@ def plan(
         _propose(folder, target_db, band, rig_time, resolution)
     if folder is not None and nominal is None:
         return
-    asked = None if effects is None else [name.strip() for name in effects.split(",")]
+    asked = names_in(effects)
     if folder is not None:
         _foresee_bags(folder, str(nominal), tolerance, asked, out)
         return
-    own = own_settings(settings, record, duration, periods, transient_periods)
-    _foresee_plan(
-        dict(
-            rig=rig,
-            settings=[setting for setting in settings or [] if setting not in own],
-            amplitudes_rad=tuple(level) if level else None,
-            realizations=realizations,
-            periods=periods,
-            transient_periods=transient_periods,
-            seed=seed,
-        ),
-        (controller, record, duration, own),
-        nominal,
-        tolerance,
-        asked,
-        out,
-    )
+    own = described.own_settings(options)
+    campaign = options.campaign(rig, without=own)
+    _foresee_plan(campaign, described, own, nominal, tolerance, asked, out)
 
 
 def _propose(
@@ -198,8 +157,9 @@ def _foresee_bags(
 
 
 def _foresee_plan(
-    options: dict[str, Any],
-    described: tuple[Path | None, str | None, float | None, list[str]],
+    campaign: Campaign,
+    described: RunOptions,
+    settings: list[str],
     nominal: str | None,
     tolerance: float,
     effects: list[str] | None,
@@ -210,15 +170,11 @@ def _foresee_plan(
     from fjr_sim_node.plant import PLANT
     from gap_diagnosis.model.nominal import read_nominal, refuse_effects
 
-    campaign = described_campaign(options.pop("rig"), options.pop("settings"), None, **options)
     if nominal is not None:
         rig = {**campaign.values["simulator"], **read_nominal(nominal)}
         campaign = Campaign({**campaign.values, "simulator": rig})
     refuse_effects(campaign.values["simulator"], "/rig/simulator")
-    controller, record, *_ = described
-    runs, reference = None, None
-    if controller is not None or record is not None:
-        runs, reference = described_runs(campaign, *described)
+    runs, reference = described.runs(campaign, settings) if described.given else (None, None)
     values = {name: float(campaign.values["simulator"][name]) for name in PLANT.names}
     _foresee(
         planned_record(campaign, runs, reference),

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+if TYPE_CHECKING:
+    from fjr_records.experiment_bag import Override
 
 MapSignals = Annotated[
     list[str] | None,
@@ -38,3 +42,18 @@ TransientPeriods = Annotated[
     int | None,
     typer.Option(min=0, help="Leading periods to discard; default: as described, or found."),
 ]
+
+
+@dataclass(frozen=True)
+class PeriodOptions:
+    """Options of `analyze`, `diagnose` and `fit`: the periods of a multisine."""
+
+    samples_per_period: SamplesPerPeriod = None
+    transient_periods: TransientPeriods = None
+    periods: Periods = None
+
+    def override(self) -> Override:
+        """Return what to take instead of what the bags say."""
+        from fjr_records.experiment_bag import Override
+
+        return Override(self.samples_per_period, self.transient_periods, self.periods)

@@ -10,20 +10,9 @@ import typer
 
 from fjr_kit.errors import needing_ros
 
-from .campaign_options import (
-    DryRun,
-    Levels,
-    Out,
-    Periods,
-    Realizations,
-    Rig,
-    Seed,
-    Set,
-    TransientPeriods,
-    described_campaign,
-    print_estimate,
-)
+from .campaign_options import CampaignOptions, DryRun, Out, Rig, print_estimate
 from .cli_errors import reports_errors
+from .option_groups import takes_groups
 
 if TYPE_CHECKING:
     from fjr_bringup.campaign.plan import Campaign
@@ -32,8 +21,6 @@ if TYPE_CHECKING:
 Composed = Annotated[
     bool, typer.Option("--composed", help="All nodes in one process instead of one each: faster.")
 ]
-
-
 Live = Annotated[
     bool, typer.Option("--live", help="Draw the BLA after each realization, as it is until then.")
 ]
@@ -49,15 +36,12 @@ UntilDb = Annotated[
 
 
 @reports_errors(kept="nothing was recorded")
+@takes_groups
 def run(
+    *,
     rig: Rig = None,
     out: Out = None,
-    level: Levels = None,
-    realizations: Realizations = None,
-    periods: Periods = None,
-    transient_periods: TransientPeriods = None,
-    seed: Seed = None,
-    settings: Set = None,
+    options: CampaignOptions,
     composed: Composed = False,
     live: Live = False,
     until_db: UntilDb = None,
@@ -67,16 +51,7 @@ def run(
     from .campaign_folder import fill_folder, new_folder
 
     folder = out or new_folder()
-    campaign = described_campaign(
-        rig,
-        settings,
-        folder,
-        amplitudes_rad=tuple(level) if level else None,
-        realizations=realizations,
-        periods=periods,
-        transient_periods=transient_periods,
-        seed=seed,
-    )
+    campaign = options.campaign(rig, folder)
     if dry_run:
         print_estimate(campaign, out, on_graph=True)
         return

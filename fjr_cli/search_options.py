@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from .campaign_options import Realizations, Seed, Set, described_campaign
+
 if TYPE_CHECKING:
+    from fjr_bringup.campaign.plan import Campaign
     from fjr_bringup.design.bench import Bench
 
 TorqueLimit = Annotated[
@@ -21,11 +26,32 @@ Graph = Annotated[
 ]
 
 
-def bench_of(graph: bool, out: Path) -> Bench:
-    """Return the ROS graph, with bags below `out`, or the batch simulation, as asked for."""
-    from fjr_bringup.design.bench import batch_bench, graph_bench
+@dataclass(frozen=True)
+class SearchOptions:
+    """Options of `amplitude` and `shape`: what is measured, and where."""
 
-    return graph_bench(out) if graph else batch_bench
+    torque_limit: TorqueLimit = math.inf
+    position_limit: PositionLimit = math.inf
+    realizations: Realizations = None
+    seed: Seed = None
+    settings: Set = None
+    graph: Graph = False
+
+    def campaign(self, rig: Path | None, level: float | None = None) -> Campaign:
+        """Return the campaign to measure by, of one amplitude of a line in rad if it is given."""
+        return described_campaign(
+            rig,
+            self.settings,
+            amplitudes_rad=None if level is None else (level,),
+            realizations=self.realizations,
+            seed=self.seed,
+        )
+
+    def bench(self, out: Path) -> Bench:
+        """Return the ROS graph, with bags below `out`, or the batch simulation, as asked for."""
+        from fjr_bringup.design.bench import batch_bench, graph_bench
+
+        return graph_bench(out) if self.graph else batch_bench
 
 
 def tell(sentence: str) -> None:

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from .campaign_options import Realizations, Rig, Seed, Set, described_campaign
+from .campaign_options import Rig
 from .cli_errors import reports_errors
-from .search_options import Graph, PositionLimit, TorqueLimit, bench_of, tell
+from .option_groups import takes_groups
+from .search_options import SearchOptions, tell
 
 
 @reports_errors(kept="bags that were recorded are kept, and the same command goes on")
+@takes_groups
 def shape(
+    *,
     out: Annotated[Path, typer.Option(metavar="FOLDER", help="Folder of the results.")] = Path(
         "experiments/shaped"
     ),
@@ -32,12 +34,7 @@ def shape(
         float, typer.Option(min=0.05, max=1.0, help="Exponent of the step; 1 is the paper's.")
     ] = 0.8,
     iterations: Annotated[int, typer.Option(min=1, help="Most iterations.")] = 10,
-    torque_limit: TorqueLimit = math.inf,
-    position_limit: PositionLimit = math.inf,
-    realizations: Realizations = None,
-    seed: Seed = None,
-    settings: Set = None,
-    graph: Graph = False,
+    options: SearchOptions,
 ) -> None:
     """Shape the excitation until the torque spectrum is flat (algorithm 1 of the paper).
 
@@ -52,20 +49,17 @@ def shape(
     from fjr_bringup.design.shaping_output import write_shaping
     from fjr_kit.folder_lock import locked_folder
 
-    levels = None if level is None else (level,)
-    campaign = described_campaign(
-        rig, settings, amplitudes_rad=levels, realizations=realizations, seed=seed
-    )
+    campaign = options.campaign(rig, level)
     given: dict[str, Any] = {
         "tolerance_db": tolerance,
         "damping": damping,
-        "torque_limit_nm": torque_limit,
-        "position_limit_rad": position_limit,
+        "torque_limit_nm": options.torque_limit,
+        "position_limit_rad": options.position_limit,
     }
     with locked_folder(out):
         passes = shape_spectrum(
             campaign,
-            bench_of(graph, out),
+            options.bench(out),
             None if torque_rms is None else ShapingGoal(torque_rms),
             iterations=iterations,
             say=tell,

@@ -8,21 +8,10 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from .campaign_options import (
-    DryRun,
-    Levels,
-    Out,
-    Periods,
-    Realizations,
-    Rig,
-    Seed,
-    Set,
-    TransientPeriods,
-    described_campaign,
-    print_estimate,
-)
+from .campaign_options import CampaignOptions, DryRun, Out, Rig, print_estimate
 from .cli_errors import reports_errors
-from .described_runs import Controller, Duration, Record, described_runs, own_settings
+from .described_runs import RunOptions
+from .option_groups import takes_groups
 from .worker_options import Workers
 
 if TYPE_CHECKING:
@@ -30,18 +19,13 @@ if TYPE_CHECKING:
 
 
 @reports_errors(kept="nothing was recorded")
+@takes_groups
 def simulate(
+    *,
     rig: Rig = None,
     out: Out = None,
-    level: Levels = None,
-    realizations: Realizations = None,
-    periods: Periods = None,
-    transient_periods: TransientPeriods = None,
-    seed: Seed = None,
-    settings: Set = None,
-    controller: Controller = None,
-    record: Record = None,
-    duration: Duration = None,
+    options: CampaignOptions,
+    described: RunOptions,
     workers: Workers = None,
     dry_run: DryRun = False,
 ) -> None:
@@ -57,35 +41,24 @@ def simulate(
     from .campaign_folder import fill_folder, new_folder
 
     folder = out or new_folder()
-    own = own_settings(settings, record, duration, periods, transient_periods)
-    campaign = described_campaign(
-        rig,
-        [setting for setting in settings or [] if setting not in own],
-        folder,
-        amplitudes_rad=tuple(level) if level else None,
-        realizations=realizations,
-        periods=periods,
-        transient_periods=transient_periods,
-        seed=seed,
-    )
+    own = described.own_settings(options)
+    campaign = options.campaign(rig, folder, without=own)
     if dry_run:
-        if record is not None or controller is not None:
+        if described.given:
             raise InputError("--dry-run is for campaigns, without --record and --controller.")
         print_estimate(campaign, out, on_graph=False)
         return
-    if record is None and controller is None:
-        fill_folder("simulate", partial(simulate_campaign, workers=workers), campaign, folder)
+    if described.given:
+        _simulate_described(campaign, folder, described, own, workers)
     else:
-        _simulate_described(campaign, folder, controller, record, duration, own, workers)
+        fill_folder("simulate", partial(simulate_campaign, workers=workers), campaign, folder)
     typer.echo(folder)
 
 
 def _simulate_described(
     campaign: Campaign,
     folder: Path,
-    controller: Path | None,
-    record: str | None,
-    duration: float | None,
+    described: RunOptions,
     settings: list[str],
     workers: int | None,
 ) -> None:
@@ -95,7 +68,7 @@ def _simulate_described(
 
     if folder.exists():
         raise InputError(f"{folder}: exists already; choose another folder or remove it.")
-    runs, reference = described_runs(campaign, controller, record, duration, settings)
+    runs, reference = described.runs(campaign, settings)
     rate = campaign.values["excitation"]["sample_rate_hz"]
     with CampaignProgress() as progress:
         seconds = [(run.samples or 0) / rate for run in runs]

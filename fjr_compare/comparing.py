@@ -20,8 +20,8 @@ from .result import (
     Kind,
     LevelDifference,
     Pair,
-    ParameterDifference,
     PowerDifference,
+    Tested,
 )
 from .statistics import holm
 from .words import POWERS, chance
@@ -109,9 +109,6 @@ def _read(place: Path, progress: Progress) -> Result | Diagnosis:
     return analyze(place)
 
 
-Test = LevelDifference | PowerDifference | ParameterDifference
-
-
 def judged_pairs(kind: Kind, first: str, pairs: Sequence[Pair], false_alarm: float) -> Comparison:
     """Return the comparison with every test corrected for all.
 
@@ -125,7 +122,7 @@ def judged_pairs(kind: Kind, first: str, pairs: Sequence[Pair], false_alarm: flo
     adjusted = holm([float(test.p_value or 0.0) for test in tests])
     by_test = {id(test): float(p) for test, p in zip(tests, adjusted, strict=True)}
 
-    def judged(test: Test) -> dict[str, object]:
+    def judged(test: Tested) -> dict[str, object]:
         p = by_test.get(id(test))
         if p is None:
             return {}
@@ -149,7 +146,7 @@ def judged_pairs(kind: Kind, first: str, pairs: Sequence[Pair], false_alarm: flo
     )
 
 
-def _with(level: LevelDifference, judged: Callable[[Test], dict[str, object]]) -> LevelDifference:
+def _with(level: LevelDifference, judged: Callable[[Tested], dict[str, object]]) -> LevelDifference:
     """Return a level with its verdicts; lines are marked in a level that changed, only."""
     mine = judged(level)
     update = {**mine, "powers": [power.model_copy(update=judged(power)) for power in level.powers]}
@@ -159,7 +156,7 @@ def _with(level: LevelDifference, judged: Callable[[Test], dict[str, object]]) -
     return level.model_copy(update=update)
 
 
-def _tests(pair: Pair) -> Iterator[Test]:
+def _tests(pair: Pair) -> Iterator[Tested]:
     for level in pair.levels:
         yield level
         yield from level.powers

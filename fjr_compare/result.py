@@ -22,6 +22,20 @@ Kind = Literal["campaigns", "diagnoses"]
 PowerKind = Literal["total", "odd", "even", "noise"]
 
 
+class Tested(ResultModel):
+    """A difference that is one of the tests of a comparison."""
+
+    p_value: Annotated[
+        OptionalNumber,
+        Field(description="How often chance alone gives so great a change; None where not known."),
+    ]
+    p_adjusted: Annotated[
+        OptionalNumber,
+        Field(description="The same, by Holm over all tests of the comparison."),
+    ] = None
+    changed: Annotated[bool, Field(description="Whether it changed.")] = False
+
+
 class BlaDifference(EqualArrays):
     """Two BLAs at the F lines that both have reliably.
 
@@ -43,18 +57,17 @@ class BlaDifference(EqualArrays):
     changed: Annotated[np.ndarray, Array("bool", bool)]
 
 
-class PowerDifference(ResultModel):
+class PowerDifference(Tested):
     """The mean power of distortion or noise in the position, at lines that both have.
+
+    It is tested with enough lines, distortion where the excited lines are the same; it changed if
+    it did so beyond chance and by 1 dB or more.
 
     Attributes:
         kind: total: distortion and noise at excited lines; odd, even: at detection lines; noise.
         first_db, other_db: mean of the lines' levels.
         change_db: other minus first.
         lines: how many lines are shared.
-        p_value: how often chance alone gives so great a change; None with too few lines, and for
-            distortion where the excited lines differ.
-        p_adjusted: the same, by Holm over all tests of the comparison.
-        changed: whether it changed, beyond chance and by 1 dB or more.
     """
 
     kind: PowerKind
@@ -62,13 +75,10 @@ class PowerDifference(ResultModel):
     other_db: Annotated[Number, Unit("dB re 1 rad")]
     change_db: Annotated[Number, Unit("dB")]
     lines: int
-    p_value: OptionalNumber
-    p_adjusted: OptionalNumber = None
-    changed: bool = False
 
 
-class LevelDifference(ResultModel):
-    """One amplitude in both campaigns.
+class LevelDifference(Tested):
+    """One amplitude in both campaigns; it is tested where the excited lines are the same.
 
     Attributes:
         name: of the level, in the first campaign.
@@ -76,10 +86,7 @@ class LevelDifference(ResultModel):
         change_percent: rms over lines of the change over |G|, less what chance alone gives.
         worst_hz: where the difference is greatest beside its disc.
         p_lines: of the most different line, corrected for the number of lines (Holm).
-        p_all: of all lines together (Fisher).
-        p_value: the smaller of both, doubled; None where the excited lines differ.
-        p_adjusted: that, by Holm over all tests of the comparison.
-        changed: whether the BLA changed.
+        p_all: of all lines together (Fisher); the smaller of both, doubled, is `p_value`.
         powers: distortion and noise.
     """
 
@@ -89,14 +96,11 @@ class LevelDifference(ResultModel):
     worst_hz: Annotated[Number, Unit("Hz")]
     p_lines: Number
     p_all: Number
-    p_value: OptionalNumber
-    p_adjusted: OptionalNumber = None
-    changed: bool = False
     powers: list[PowerDifference] = Field(default_factory=list)
 
 
-class ParameterDifference(ResultModel):
-    """One parameter in both diagnoses.
+class ParameterDifference(Tested):
+    """One parameter in both diagnoses; it is tested where both intervals are known.
 
     Attributes:
         name: of the parameter; its unit is that of the simulator's parameter.
@@ -106,9 +110,6 @@ class ParameterDifference(ResultModel):
             of both.
         change_percent: other over first, less one; None where the first is zero.
         low, high: 95 % interval of the change, other minus first, scatter included.
-        p_value: how often chance alone gives so great a change; None where an interval is unknown.
-        p_adjusted: that, by Holm over all tests of the comparison.
-        changed: whether it changed.
     """
 
     name: str
@@ -119,9 +120,6 @@ class ParameterDifference(ResultModel):
     change_percent: Annotated[OptionalNumber, Unit("%")]
     low: Number
     high: Number
-    p_value: OptionalNumber
-    p_adjusted: OptionalNumber = None
-    changed: bool = False
 
 
 class CauseDifference(ResultModel):

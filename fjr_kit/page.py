@@ -8,7 +8,7 @@ comes from bags or from a command line is escaped where it is written.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from importlib.resources import files
 from math import isfinite
@@ -16,6 +16,8 @@ from typing import Any, NamedTuple
 
 from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 from plotly.offline import get_plotlyjs
+
+from .check import Check
 
 SENTENCE = 40
 """A cell that is longer than this many characters is a sentence."""
@@ -52,6 +54,19 @@ class Mark(NamedTuple):
 Cell = str | float | Mark | list[str]
 """A text, a number in the format of its column, a mark, or texts of a line each."""
 Row = Sequence[Cell]
+
+
+def check_rows(checks: Iterable[Check], words: tuple[str, str] = ("passed", "failed")) -> list[Row]:
+    """Return a row for each check, the failed ones first, for the macro `checks` of `parts.html`.
+
+    Args:
+        checks: the checks.
+        words: for a check that passed, and for one that failed.
+    """
+    return [
+        (each.name, Mark.of(each.passed, words), each.value, each.limit, each.sentence)
+        for each in sorted(checks, key=lambda check: check.passed)
+    ]
 
 
 def render_page(

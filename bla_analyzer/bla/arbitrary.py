@@ -1,13 +1,9 @@
-"""The BLA from records of any excitation: windows by rule, lines without excitation left out.
+"""The BLA from records of any excitation: local fits at each frequency that is excited.
 
-At each frequency the local polynomial fit (`local_fit`) needs a window: wide windows average noise
-away, narrow ones follow resonances. The rule, for windows that grow by steps: fit polynomials of
-`ORDER` and of two orders less; while the two agree at this and neighbouring frequencies as chance
-lets them, the lower order would do and the window may grow. The estimate is that of the higher
-order, so that what bias the rule lets through is not in it (bias-corrected inference: Calonico,
-Cattaneo, Farrell, J. American Statistical Association 113, 2018). Variances are those of lines that
-differ in variance, and degrees of freedom by the weights of the lines (Bell and McCaffrey, Survey
-Methodology 28, 2002): distortion under a random reference is not independent of it.
+At each frequency a local polynomial fit (`local_fit`) over a window that is found by rule
+(`windows`). Variances are those of lines that differ in variance, and degrees of freedom by the
+weights of the lines (Bell and McCaffrey, Survey Methodology 28, 2002): distortion under a random
+reference is not independent of it.
 """
 
 from __future__ import annotations
@@ -22,26 +18,13 @@ from fjr_kit.errors import InputError
 from fjr_records.spectra import RealizationSpectra
 
 from ..results.result import BlaEstimate, LineLevels
-from .local_fit import Fit, Run, degrees_of_freedom, fit_window
+from .local_fit import Fit, Run, fit_window
 from .robust import INPUT_VARIANCE_LIMIT, confidence_radius, f_test
 from .sensitivity import sensitivity
+from .windows import ORDER, frequencies, window
 
-ORDER = 4
-DEGREES = 8
-"""Least degrees of freedom of a window."""
-GROWTH = 1.4
-NARROWEST, WIDEST = 0.004, 0.12
-"""Half width of a window over its frequency: no resonance is sought that is narrower, and the
-response is not held for a polynomial over more."""
-BEND, EXCESS = 1.5, 1.0
-"""Mean disagreement of the orders, over what chance gives lines of equal variance, up to which a
-window may grow, and what is added for one window; it falls with the root of their number."""
-SCAN_PER_DECADE = 40
-MOST_LINES = 1200
 INPUT_VARIANCE_LOST = 0.1
 """Var(U)/|U|^2 from which a line is left out: discs no longer cover beyond (`robust`)."""
-SILENT = 1e-16
-"""Power of the reference relative to its strongest line, below which nothing was played."""
 HIGHEST = 0.45
 """Highest frequency of an estimate over the sample rate."""
 
@@ -126,13 +109,9 @@ def arbitrary_bla(
     Raises:
         InputError: too short, or no frequency at which torque and reference stand above noise.
     """
-    centres = _scan(runs)
-    if not centres.size:
-        raise InputError("the records are too short for an estimate; record longer.")
-    halves = _half_widths(runs, centres)
-    grid, half_at = _grid(centres, halves) if at_hz is None else _at(at_hz, centres, halves)
+    grid, half_at = frequencies(runs, at_hz)
     fits = [
-        fit_window(runs, f, _window(runs, f, half), ORDER)
+        fit_window(runs, f, window(runs, f, half), ORDER)
         for f, half in zip(grid, half_at, strict=True)
     ]
     asked = at_hz is not None
@@ -157,97 +136,6 @@ def _is_excited(fit: Fit) -> bool:
     direct = fit.residual[0, 0].real <= 1e-20 * fit.power[1]
     radius = confidence_radius(np.array(fit.variance), fit.variance_degrees)
     return not direct or bool(radius < abs(fit.position))
-
-
-def _scan(runs: Sequence[Run]) -> np.ndarray:
-    """Return frequencies over the band of the reference, (C,)."""
-    low = max(run.frequency_hz[0] for run in runs)
-    high = min(_highest(run) for run in runs)
-    least = _least_half(runs, low)
-    if least is None:
-        return np.empty(0)
-    found, at = [], low + 0.5 * least
-    while at <= high:
-        found.append(at)
-        at += max(0.5 * least, at * np.log(10.0) / SCAN_PER_DECADE)
-    return np.array(found)
-
-
-def _highest(run: Run) -> float:
-    power = np.abs(run.spectra[0]) ** 2
-    return float(run.frequency_hz[np.flatnonzero(power >= SILENT * power.max())[-1]])
-
-
-def _least_half(runs: Sequence[Run], at_hz: float) -> float | None:
-    """Return half the width of the narrowest window that leaves DEGREES at a frequency."""
-    half = max(0.5 * DEGREES * min(run.frequency_hz[0] for run in runs), NARROWEST * at_hz)
-    last = max(run.frequency_hz[-1] for run in runs)
-    while half < last:
-        spans = [run.window(*_window(runs, at_hz, half)) for run in runs]
-        counts = [span.stop - span.start for span in spans]
-        if degrees_of_freedom(counts, ORDER) >= DEGREES:
-            return half
-        half *= 1.08
-    return None
-
-
-def _window(runs: Sequence[Run], at_hz: float, half: float) -> tuple[float, float]:
-    """Return a window around a frequency, shifted where it would reach beyond the lines."""
-    first = max(run.frequency_hz[0] for run in runs)
-    last = min(run.frequency_hz[-1] for run in runs)
-    low = min(max(at_hz - half, first), max(last - 2.0 * half, first))
-    return low, min(low + 2.0 * half, last)
-
-
-def _half_widths(runs: Sequence[Run], centres: np.ndarray) -> np.ndarray:
-    """Return half the width of the window at each frequency, (C,); NaN where none will do."""
-    least = np.array([_least_half(runs, f) or np.nan for f in centres])
-    halves, growing = least.copy(), np.isfinite(least)
-    for step in range(1, 40):
-        wider = least * GROWTH**step
-        growing &= wider <= WIDEST * centres
-        if not growing.any():
-            break
-        bends = np.full(centres.shape, np.nan)
-        for i in np.flatnonzero(growing):
-            fit = fit_window(runs, centres[i], _window(runs, centres[i], wider[i]), ORDER)
-            bends[i] = np.nan if fit is None else min(fit.bend, 1e6)
-        for i in np.flatnonzero(growing):
-            near = bends[(np.abs(centres - centres[i]) <= wider[i]) & np.isfinite(bends)]
-            if near.size and near.mean() <= BEND + EXCESS / np.sqrt(near.size):
-                halves[i] = wider[i]
-            else:
-                growing[i] = False
-    return halves
-
-
-def _grid(centres: np.ndarray, halves: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the frequencies of the estimate, half a half width apart, and the half widths."""
-    known = np.isfinite(halves)
-    centres, halves = centres[known], halves[known]
-    narrow, share = _narrowed(halves), 0.5
-    while True:
-        found, at = [], float(centres[0])
-        while at <= centres[-1]:
-            found.append(at)
-            at += share * float(np.interp(at, centres, narrow))
-        if len(found) <= MOST_LINES:
-            grid = np.array(found)
-            return grid, np.interp(grid, centres, narrow)
-        share *= len(found) / MOST_LINES
-
-
-def _at(
-    at_hz: np.ndarray, centres: np.ndarray, halves: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    known = np.isfinite(halves)
-    return at_hz, np.interp(at_hz, centres[known], _narrowed(halves[known]))
-
-
-def _narrowed(halves: np.ndarray) -> np.ndarray:
-    """Return the least half width of each frequency and its neighbours."""
-    padded = np.concatenate([halves[:1], halves, halves[-1:]])
-    return np.minimum(halves, np.minimum(padded[:-2], padded[2:]))
 
 
 def _estimate(

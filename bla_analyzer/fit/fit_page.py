@@ -28,6 +28,7 @@ def render_fit(fit: Fit, provenance: Mapping[str, str]) -> str:
         fit=fit,
         headline=headline(fit),
         bad=not all(level.test.passed for level in fit.levels),
+        findings=[(level.name, level.findings) for level in fit.levels],
         names=[level.name for level in fit.levels],
         quantities=[[_row(name, one) for name, one in quantities(level)] for level in fit.levels],
         roots=[_roots(level) for level in fit.levels],

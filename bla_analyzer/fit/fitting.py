@@ -16,6 +16,7 @@ from ..results.summary import SIGNIFICANCE, level_name
 from .described_model import Described, described
 from .fit_types import Curve, Fit, LevelFit, ModelName, Output, OutputFit, Root
 from .fit_words import between_levels, findings
+from .likelihood import Task
 from .order_search import Order, Tried, fit_order, search, tried
 from .order_tests import whiteness
 from .physical_fit import fit_physical
@@ -144,7 +145,7 @@ def _fit_level(
     tell(name)
     if model != "rational":
         seen = Sampled.of(samples.frequency_hz, rate, "s", hold)
-        all_tried = [tried(model, samples, fit_physical(samples, seen, model, start, free))]
+        all_tried = [tried(model, samples, fit_physical(Task(samples, seen, start, free), model))]
     elif order is not None:
         all_tried = [fit_order(samples, rate, order, domain, hold, start, free)]
     else:

@@ -11,6 +11,7 @@ from fjr_kit.errors import InputError
 
 from .described_model import Fitted
 from .fit_types import OrderTest
+from .likelihood import Task
 from .order_tests import order_test
 from .rational import fit_rational
 from .sampled import Domain, Hold, Sampled
@@ -63,7 +64,7 @@ def fit_order(
             f"{2 * samples.g.size} numbers; choose a lower order."
         )
     seen = Sampled.of(samples.frequency_hz, rate_hz, domain, hold, na - nb)
-    model = fit_rational(samples, seen, nb, na, delay_s, free_delay)
+    model = fit_rational(Task(samples, seen, delay_s, free_delay), nb, na)
     return tried(f"{nb}/{na}", samples, model)
 
 

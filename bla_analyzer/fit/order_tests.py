@@ -31,7 +31,7 @@ def order_test(
     """
     white = samples.white_covariance
     count = uncertainty.bread.shape[0]
-    cost = float((np.abs(samples.whitened(samples.g - model)) ** 2).sum())
+    cost = samples.cost(model)
     shares = np.einsum("faa->f", white).real
     squares = np.einsum("fab,fba->f", white, white).real / (1.0 + 1.0 / samples.degrees)
     total = float(shares.sum())

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from fjr_kit.errors import InputError
 
+from .likelihood import Task, refined
 from .physical import Physical, Scaled, polynomials, starts
 from .sampled import Sampled
-from .samples import Samples
 
 STARTS = 3
 TRIED, MOST = 15, 150
@@ -100,69 +99,28 @@ class PhysicalModel:
         return np.array(padded), lower
 
 
-def fit_physical(
-    samples: Samples,
-    sampled: Sampled,
-    kind: Physical,
-    delay_s: float = 0.0,
-    free_delay: bool = False,
-) -> PhysicalModel:
+def fit_physical(task: Task, kind: Physical) -> PhysicalModel:
     """Fit a physical model.
-
-    Args:
-        samples: the lines.
-        sampled: how the model is seen at them.
-        kind: which model.
-        delay_s: the delay, or where its search begins.
-        free_delay: whether it is fitted.
 
     Raises:
         InputError: the BLA is that of no such joint.
     """
     found = None
     if kind == "extra-mode":
-        found = fit_physical(samples, sampled, "two-inertia", delay_s, free_delay).parameters
-        delay_s = found["delay_s"]
-    data = samples.g / sampled.main(delay_s)[:, None]
+        found = fit_physical(task, "two-inertia").parameters
+        task = replace(task, delay_s=found["delay_s"])
+    samples, sampled, delay = task.samples, task.sampled, {"delay_s": task.delay_s}
     w = 2.0 * np.pi * float(np.sqrt(samples.frequency_hz[0] * samples.frequency_hz[-1]))
     best, least = None, np.inf
-    for start in starts(kind, samples.frequency_hz, data, found)[:STARTS]:
-        begin = {**start, "delay_s": delay_s}
-        scaled = Scaled.of(kind, begin, w, sampled.rate_hz, free_delay)
-        fixed = {} if free_delay else {"delay_s": delay_s}
+    for start in starts(kind, samples.frequency_hz, task.data, found)[:STARTS]:
+        begin = {**start, **delay}
+        scaled = Scaled.of(kind, begin, w, sampled.rate_hz, task.free_delay)
+        fixed = {} if task.free_delay else delay
         model = PhysicalModel(kind, sampled, scaled, scaled.values(begin), fixed, samples.outputs)
-        model = _refined(samples, model, TRIED)
-        cost = float((np.abs(samples.whitened(samples.g - model.seen())) ** 2).sum())
+        model = refined(samples, model, TRIED)
+        cost = samples.cost(model.seen())
         if cost < least:
             best, least = model, cost
     if best is None:
         raise InputError(f"The {kind} model comes near no line of this BLA; fit another model.")
-    return _refined(samples, best, MOST)
-
-
-def _refined(samples: Samples, model: PhysicalModel, evaluations: int) -> PhysicalModel:
-    """Return the model after Levenberg-Marquardt."""
-
-    def residual(values: np.ndarray) -> np.ndarray:
-        error = samples.whitened(model.with_values(values).seen() - samples.g).ravel()
-        return np.nan_to_num(
-            np.concatenate([error.real, error.imag]), nan=1e150, posinf=1e150, neginf=-1e150
-        )
-
-    def slopes(values: np.ndarray) -> np.ndarray:
-        jacobian = samples.whitened(model.with_values(values).response()[1])
-        jacobian = jacobian.reshape(-1, jacobian.shape[2])
-        return np.nan_to_num(np.concatenate([jacobian.real, jacobian.imag]))
-
-    with np.errstate(all="ignore"):
-        found = least_squares(
-            residual,
-            model.values,
-            slopes,
-            method="lm",
-            xtol=1e-10,
-            ftol=1e-11,
-            gtol=1e-11,
-            max_nfev=evaluations,
-        )
-    return model.with_values(found.x)
+    return refined(samples, best, MOST)

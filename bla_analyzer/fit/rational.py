@@ -12,13 +12,13 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from .basis import Basis
+from .likelihood import Task, refined, slopes
 from .sampled import Sampled
-from .samples import Samples
 
 ITERATIONS = 30
+EVALUATIONS = 100
 ROUNDS = 2
 """Fits in a basis each; the second is orthonormal about the first one's denominator."""
 
@@ -68,6 +68,10 @@ class RationalModel:
         x = self.sampled.x
         return tuple(basis.at(x) for basis in self.upper), self.lower.at(x)
 
+    def seen(self) -> np.ndarray:
+        """Return G, complex (F, O)."""
+        return self.response()[0]
+
     def response(self) -> tuple[np.ndarray, np.ndarray]:
         """Return G, complex (F, O), and its Jacobian by the free parameters, (F, O, p)."""
         uppers, lower = self._terms
@@ -88,54 +92,27 @@ class RationalModel:
         return g, jacobian
 
 
-def fit_rational(
-    samples: Samples,
-    sampled: Sampled,
-    nb: int,
-    na: int,
-    delay_s: float = 0.0,
-    free_delay: bool = False,
-) -> RationalModel:
-    """Fit numerators of degree nb and a common denominator of degree na.
-
-    Args:
-        samples: the lines.
-        sampled: how the model is seen at them.
-        nb: degree of every numerator.
-        na: degree of the denominator.
-        delay_s: the delay, or where its search begins.
-        free_delay: whether it is fitted.
-    """
-    model = _start(samples, sampled, nb, na, delay_s, free_delay)
+def fit_rational(task: Task, nb: int, na: int) -> RationalModel:
+    """Fit numerators of degree nb and a common denominator of degree na."""
+    model = _start(task, nb, na)
     for _ in range(ROUNDS):
-        model = _refined(samples, model)
-        model = _rebased(samples, model)
+        size = np.linalg.norm(slopes(task.samples, model), axis=0)
+        model = refined(task.samples, model, EVALUATIONS, 1.0 / np.maximum(size, 1e-300))
+        model = _rebased(replace(task, delay_s=model.delay_s), model)
     return model
 
 
-def cost_of(samples: Samples, model: RationalModel) -> float:
-    """Return sum_k e_k^H C_k^-1 e_k."""
-    return _cost(samples, model.response()[0])
-
-
-def _cost(samples: Samples, g: np.ndarray) -> float:
-    return float((np.abs(samples.whitened(samples.g - g)) ** 2).sum())
-
-
-def _start(
-    samples: Samples, sampled: Sampled, nb: int, na: int, delay_s: float, free_delay: bool
-) -> RationalModel:
+def _start(task: Task, nb: int, na: int) -> RationalModel:
     """Return the best of the models that the iteration passes through, from two sets of weights."""
     best, least = None, np.inf
-    data = samples.g / sampled.main(delay_s)[:, None]
-    size = np.linalg.norm(samples.whitened(data), axis=1)
+    size = np.linalg.norm(task.samples.whitened(task.data), axis=1)
     for first in (np.ones(size.size), size):
         denominator = first.astype(complex)
         for _ in range(ITERATIONS):
-            found = _linear(samples, sampled, data, nb, na, denominator, delay_s, free_delay)
-            before, denominator = denominator, found.lower.at(sampled.main_x) @ found.a
+            found = _linear(task, *_bases(task, nb, na, denominator), denominator)
+            before, denominator = denominator, found.lower.at(task.sampled.main_x) @ found.a
             denominator = denominator / np.linalg.norm(denominator)
-            cost = _cost(samples, found.response()[0])
+            cost = task.samples.cost(found.seen())
             if cost < least:
                 best, least = found, cost
             if np.abs(np.abs(before) - np.abs(denominator)).max() < 1e-6:
@@ -145,52 +122,39 @@ def _start(
 
 
 def _linear(
-    samples: Samples,
-    sampled: Sampled,
-    data: np.ndarray,
-    nb: int,
-    na: int,
-    denominator: np.ndarray,
-    delay_s: float,
-    free_delay: bool,
+    task: Task, upper: tuple[Basis, ...], lower: Basis, denominator: np.ndarray
 ) -> RationalModel:
     """Return the linear least squares solution with a given denominator in the weight."""
-    bases = _bases(samples, sampled, data, nb, na, denominator, delay_s)
-    upper, lower = bases
-    x, held = sampled.main_x, sampled.main(delay_s)
+    x, outputs = task.sampled.main_x, task.samples.outputs
     columns = []
     for o, basis in enumerate(upper):
-        unit = np.zeros((samples.outputs, 1))
+        unit = np.zeros((outputs, 1))
         unit[o] = 1.0
         columns.append(basis.at(x)[:, None, :] * unit)
-    columns.append(-data[:, :, None] * lower.at(x)[:, None, :])
-    matrix = np.concatenate(columns, axis=2) * (held / denominator)[:, None, None]
-    white = samples.whitened(matrix).reshape(-1, matrix.shape[2])
+    columns.append(-task.data[:, :, None] * lower.at(x)[:, None, :])
+    matrix = np.concatenate(columns, axis=2) * (task.held / denominator)[:, None, None]
+    white = task.samples.whitened(matrix).reshape(-1, matrix.shape[2])
     stacked = np.concatenate([white.real, white.imag])
     solution = np.linalg.svd(stacked, full_matrices=False)[2][-1]
-    count = samples.outputs * (nb + 1)
+    count = outputs * (upper[0].degree + 1)
     norm = np.linalg.norm(solution[count:])
-    b, a = solution[:count].reshape(-1, nb + 1) / norm, solution[count:] / norm
-    return RationalModel(sampled, upper, lower, b, a, _complement(a), delay_s, free_delay)
+    b, a = solution[:count].reshape(outputs, -1) / norm, solution[count:] / norm
+    return RationalModel(
+        task.sampled, upper, lower, b, a, _complement(a), task.delay_s, task.free_delay
+    )
 
 
 def _bases(
-    samples: Samples,
-    sampled: Sampled,
-    data: np.ndarray,
-    nb: int,
-    na: int,
-    denominator: np.ndarray,
-    delay_s: float,
+    task: Task, nb: int, na: int, denominator: np.ndarray
 ) -> tuple[tuple[Basis, ...], Basis]:
     """Return polynomials that are orthonormal under the weights of a given denominator."""
-    x = sampled.main_x
-    share = np.abs(sampled.main(delay_s) / denominator)
+    x, samples = task.sampled.main_x, task.samples
+    share = np.abs(task.held / denominator)
     upper = tuple(
         Basis.on(x, share * np.linalg.norm(samples.whitening[:, :, o], axis=1), nb)
         for o in range(samples.outputs)
     )
-    return upper, Basis.on(x, share * np.linalg.norm(samples.whitened(data), axis=1), na)
+    return upper, Basis.on(x, share * np.linalg.norm(samples.whitened(task.data), axis=1), na)
 
 
 def _complement(a: np.ndarray) -> np.ndarray:
@@ -198,41 +162,11 @@ def _complement(a: np.ndarray) -> np.ndarray:
     return np.linalg.svd(a[None, :])[2][1:].T
 
 
-def _refined(samples: Samples, model: RationalModel) -> RationalModel:
-    """Return the model after Levenberg-Marquardt."""
-
-    def residual(values: np.ndarray) -> np.ndarray:
-        error = samples.whitened(model.with_values(values).response()[0] - samples.g).ravel()
-        return np.concatenate([error.real, error.imag])
-
-    def slopes(values: np.ndarray) -> np.ndarray:
-        jacobian = samples.whitened(model.with_values(values).response()[1])
-        jacobian = jacobian.reshape(-1, jacobian.shape[2])
-        return np.concatenate([jacobian.real, jacobian.imag])
-
-    start = model.values
-    scale = 1.0 / np.maximum(np.linalg.norm(slopes(start), axis=0), 1e-300)
-    with np.errstate(all="ignore"):
-        found = least_squares(
-            lambda v: np.nan_to_num(residual(v * scale), nan=1e150, posinf=1e150, neginf=-1e150),
-            start / scale,
-            lambda v: np.nan_to_num(slopes(v * scale) * scale),
-            method="lm",
-            xtol=1e-10,
-            ftol=1e-11,
-            gtol=1e-11,
-            max_nfev=100,
-        )
-    return model.with_values(found.x * scale)
-
-
-def _rebased(samples: Samples, model: RationalModel) -> RationalModel:
+def _rebased(task: Task, model: RationalModel) -> RationalModel:
     """Return the same model in polynomials that are orthonormal about its own denominator."""
-    seen, x = model.sampled, model.sampled.main_x
+    x = task.sampled.main_x
     denominator = model.lower.at(x) @ model.a
-    data = samples.g / seen.main(model.delay_s)[:, None]
-    nb, na = model.b.shape[1] - 1, model.a.size - 1
-    upper, lower = _bases(samples, seen, data, nb, na, denominator, model.delay_s)
+    upper, lower = _bases(task, model.b.shape[1] - 1, model.a.size - 1, denominator)
     a = _expressed(lower, x, denominator)
     norm = np.linalg.norm(a)
     b = [
@@ -240,9 +174,7 @@ def _rebased(samples: Samples, model: RationalModel) -> RationalModel:
         for new, old, each in zip(upper, model.upper, model.b, strict=True)
     ]
     a = a / norm
-    return RationalModel(
-        seen, upper, lower, np.array(b) / norm, a, _complement(a), model.delay_s, model.free_delay
-    )
+    return replace(model, upper=upper, lower=lower, b=np.array(b) / norm, a=a, along=_complement(a))
 
 
 def _expressed(basis: Basis, x: np.ndarray, values: np.ndarray) -> np.ndarray:

@@ -50,6 +50,10 @@ class Samples:
         """Return errors (F, O, ...) with the weight applied."""
         return np.einsum("fab,fb...->fa...", self.whitening, errors)
 
+    def cost(self, model: np.ndarray) -> float:
+        """Return sum_k e_k^H W_k e_k, e the distance of g from a model's, complex (F, O)."""
+        return float((np.abs(self.whitened(self.g - model)) ** 2).sum())
+
     @property
     def white_covariance(self) -> np.ndarray:
         """The covariance of whitened errors as estimated at each line, complex (F, O, O)."""

@@ -22,7 +22,14 @@ from fjr_kit.figure_style import (
 )
 
 from ..results.result import Result
-from ..results.summary import decibel, level_name, magnitude_band_db, summarize
+from ..results.summary import (
+    amplitudes_rad,
+    decibel,
+    level_name,
+    magnitude_band_db,
+    summarize,
+    v_by_model,
+)
 
 PASSED, FAILED = "#0072B2", "#D55E00"
 SMALLEST_RATIO = 1e-3
@@ -58,34 +65,22 @@ def _shades(count: int) -> list[tuple[float, ...]]:
     return [tuple(shade) for shade in shades.tolist()]
 
 
-def _amplitudes(result: Result) -> np.ndarray:
-    """Return the rms over lines of the reference amplitude of each level (rad)."""
-    return np.array(
-        [
-            np.sqrt(np.mean(level.amplitude_rad**2)) if level.amplitude_rad.size else np.nan
-            for level in result.levels
-        ]
-    )
-
-
 def _draw_v(axis: Axes, result: Result) -> None:
     """Draw V (mean over lines) of every model against amplitude."""
-    names = dict.fromkeys(c.name for level in result.levels for c in level.comparisons)
-    amplitude = _amplitudes(result)
-    for name, (colour, dash) in zip(names, model_styles(), strict=False):
-        found = [{c.name: c.v_mean for c in level.comparisons} for level in result.levels]
-        v = np.array([values.get(name, np.nan) for values in found])
+    found = v_by_model(result)
+    amplitude = amplitudes_rad(result)
+    for (name, v), (colour, dash) in zip(found.items(), model_styles(), strict=False):
         axis.plot(amplitude, v, dash, marker="o", color=colour, label=name)
     axis.set_ylabel("V (dB²)", labelpad=2)
     axis.set_ylim(bottom=0)
     _amplitude_axis(axis, amplitude)
-    if names:
+    if found:
         axis.legend(loc="lower left", bbox_to_anchor=(0, 1), borderaxespad=0.2, ncol=2)
 
 
 def _draw_distortion(axis: Axes, result: Result) -> None:
     """Draw the mean power at each kind of line against amplitude."""
-    amplitude = _amplitudes(result)
+    amplitude = amplitudes_rad(result)
     numbers = [summarize(level) for level in result.levels]
     for name, colour, marker in (
         ("linear", EXCITED, "o"),

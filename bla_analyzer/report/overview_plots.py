@@ -11,12 +11,14 @@ from fjr_kit.plots import LOG, Options, Plot, Trace, area, layout, linked, trace
 
 from ..results.result import BlaEstimate, LevelResult, Result
 from ..results.summary import (
+    amplitudes_rad,
     bla_phase_deg,
     decibel,
     level_name,
     magnitude_band_db,
     phase_reach_deg,
     summarize,
+    v_by_model,
 )
 from .report_plots import KINDS, MODEL_LINES
 
@@ -36,15 +38,6 @@ def overview_plots(result: Result) -> dict[str, Plot]:
         "all-power": _all_power(result),
     }
     return {name: plot for name, plot in plots.items() if plot["data"]}
-
-
-def _amplitudes(result: Result) -> np.ndarray:
-    return np.array(
-        [
-            np.sqrt(np.mean(level.amplitude_rad**2)) if level.amplitude_rad.size else np.nan
-            for level in result.levels
-        ]
-    )
 
 
 def _known(result: Result) -> Iterator[tuple[LevelResult, BlaEstimate, str, Options]]:
@@ -99,14 +92,11 @@ def _all_sensitivity(result: Result, f: np.ndarray) -> Plot:
 
 def _all_v(result: Result) -> Plot:
     """Return V of every model against amplitude."""
-    names = list(dict.fromkeys(c.name for level in result.levels for c in level.comparisons))
     traces = []
-    for i, name in enumerate(names):
+    for i, (name, v) in enumerate(v_by_model(result).items()):
         color, dash = MODEL_LINES[i % len(MODEL_LINES)]
-        found = [{c.name: c.v_mean for c in level.comparisons} for level in result.levels]
-        v = np.array([values.get(name, np.nan) for values in found])
         style: Options = {"dash": dash, "symbol": "circle", "at": AMPLITUDE}
-        traces.append(trace(_amplitudes(result), v, name, color, **style, unit="dB²"))
+        traces.append(trace(amplitudes_rad(result), v, name, color, **style, unit="dB²"))
     return {"data": traces, "layout": _amplitude_layout(result, "V (dB²)")}
 
 
@@ -119,13 +109,15 @@ def _all_power(result: Result) -> Plot:
         y = np.array([getattr(number, field) for number in sums])
         if np.isfinite(y).any():
             style: Options = {"dash": "solid", "symbol": symbol, "at": AMPLITUDE}
-            traces.append(trace(_amplitudes(result), y, name, color, **style, unit="dB re 1 rad"))
+            traces.append(
+                trace(amplitudes_rad(result), y, name, color, **style, unit="dB re 1 rad")
+            )
     return {"data": traces, "layout": _amplitude_layout(result, "mean power (dB re 1 rad)")}
 
 
 def _amplitude_layout(result: Result, title: str) -> dict[str, Any]:
     made = layout("amplitude of a line (rad, rms)", title)
-    amplitude = _amplitudes(result)
+    amplitude = amplitudes_rad(result)
     if amplitude.min() > 0 and amplitude.max() > 3 * amplitude.min():
         made["xaxis"] |= LOG | {"dtick": "D2"}
     return made

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from controller_node.law import acts_on_error
-from fjr_kit.page import Cell, Mark, Row, render_page
+from fjr_kit.page import Cell, Row, check_rows, render_page
 
 from ..results.findings import all_findings
 from ..results.loop import what_lacks
@@ -34,7 +34,6 @@ def render_report(result: Result, provenance: Mapping[str, str]) -> str:
     origin = {"folder": result.source, **provenance}
     if result.controller is not None:
         origin["controller"] = json.dumps(result.controller, ensure_ascii=False, default=str)
-    checks = sorted(result.checks, key=lambda check: check.passed)
     return render_page(
         "bla_analyzer.report",
         "report.html",
@@ -55,7 +54,7 @@ def render_report(result: Result, provenance: Mapping[str, str]) -> str:
         assumed=acts_on_error(result.controller, result.sample_rate_hz) is None,
         link_lines=[_link_lines(one.bla) for one in result.levels],
         lines=[None if one.bla is None else _lines(one.bla) for one in result.levels],
-        checks=[(c.name, Mark.of(c.passed), c.value, c.limit, c.sentence) for c in checks],
+        checks=check_rows(result.checks),
     )
 
 

@@ -158,6 +158,23 @@ def noise_of(level: LevelResult) -> np.ndarray:
     return detection if detection.size else level.excited.noise
 
 
+def amplitudes_rad(result: Result) -> np.ndarray:
+    """Return the rms over lines of the amplitude of each level, rad; NaN without lines."""
+    return np.array(
+        [
+            np.sqrt(np.mean(level.amplitude_rad**2)) if level.amplitude_rad.size else np.nan
+            for level in result.levels
+        ]
+    )
+
+
+def v_by_model(result: Result) -> dict[str, np.ndarray]:
+    """Return V of each model at each level, dB^2, (levels,); NaN where it was not compared."""
+    found = [{c.name: c.v_mean for c in level.comparisons} for level in result.levels]
+    names = dict.fromkeys(name for values in found for name in values)
+    return {name: np.array([values.get(name, np.nan) for values in found]) for name in names}
+
+
 def level_name(level: LevelResult) -> str:
     """Return the name of a level, such as 'Level 0, 7 mrad', by its line amplitude or its rms."""
     if not level.amplitude_rad.size or not np.isfinite(level.reference_rms_rad):

@@ -12,17 +12,11 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 from rclpy.topic_endpoint_info import TopicEndpointInfo
-from rosbags.interfaces import (
-    Qos,
-    QosDurability,
-    QosHistory,
-    QosLiveliness,
-    QosReliability,
-    QosTime,
-)
+from rosbags.interfaces import Qos, QosDurability, QosHistory, QosReliability
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.typesys import Stores, get_typestore
 
+from fjr_interface.bags.qos import stated_qos
 from fjr_interface.bags.storage import ChecksummedWriter
 from fjr_interface.ros.messages import message_class
 from fjr_kit.atomic import new_partial
@@ -37,7 +31,6 @@ _DISCOVERY_S = 2.0
 _SAY_S = 3.0
 _DEPTH = 5000
 """Messages of one topic that may come between two looks."""
-_FOREVER = QosTime(9223372036, 854775807)
 _OF_ROS = {"/rosout", "/parameter_events"}
 
 
@@ -147,16 +140,11 @@ def _readable(offers: Sequence[TopicEndpointInfo]) -> QoSProfile:
 
 def _recorded(offered: QoSProfile) -> Qos:
     """Return an offered QoS as it stands in a bag."""
-    return Qos(
+    return stated_qos(
         QosHistory[offered.history.name],
         offered.depth,
         QosReliability[offered.reliability.name],
         QosDurability[offered.durability.name],
-        _FOREVER,
-        _FOREVER,
-        QosLiveliness.AUTOMATIC,
-        _FOREVER,
-        False,
     )
 
 

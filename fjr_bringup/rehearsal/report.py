@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from fjr_kit.page import Mark, Row, render_page
+from fjr_kit.page import Row, check_rows, render_page
 from fjr_kit.plots import SECONDS, Options, Plot, extremes, frequency_layout, layout, stack, trace
 
 from .prediction import Prediction
@@ -35,7 +35,6 @@ def render(rehearsal: Rehearsal, provenance: Mapping[str, str]) -> str:
         "experiment": json.dumps(rehearsal.experiment, ensure_ascii=False, default=str),
         **provenance,
     }
-    checks = sorted(rehearsal.checks, key=lambda check: check.passed)
     return render_page(
         "fjr_bringup.rehearsal",
         "rehearsal.html",
@@ -52,7 +51,7 @@ def render(rehearsal: Rehearsal, provenance: Mapping[str, str]) -> str:
             (name, each.policy, *map(str, (each.priority, each.nice, each.cores)))
             for name, each in rehearsal.machine.nodes.items()
         ],
-        checks=[(c.name, Mark.of(c.passed, _WORDS), c.value, c.limit, c.sentence) for c in checks],
+        checks=check_rows(rehearsal.checks, _WORDS),
     )
 
 

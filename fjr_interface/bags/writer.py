@@ -14,14 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rosbags.interfaces import (
-    Qos,
-    QosDurability,
-    QosHistory,
-    QosLiveliness,
-    QosReliability,
-    QosTime,
-)
+from rosbags.interfaces import QosDurability, QosHistory, QosReliability
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.typesys import Stores, get_typestore
 
@@ -43,27 +36,15 @@ from ..topics import (
 )
 from .files import bag_files
 from .joint_state import JointStateWriter
+from .qos import stated_qos
 from .storage import ChecksummedWriter
 
-_FOREVER = QosTime(9223372036, 854775807)
-
-
-def _qos(durability: QosDurability, depth: int) -> Qos:
-    return Qos(
-        QosHistory.KEEP_LAST,
-        depth,
-        QosReliability.RELIABLE,
-        durability,
-        _FOREVER,
-        _FOREVER,
-        QosLiveliness.AUTOMATIC,
-        _FOREVER,
-        False,
-    )
-
-
-SIGNAL_QOS = _qos(QosDurability.VOLATILE, SIGNAL_DEPTH)
-EXPERIMENT_QOS = _qos(QosDurability.TRANSIENT_LOCAL, 1)
+SIGNAL_QOS = stated_qos(
+    QosHistory.KEEP_LAST, SIGNAL_DEPTH, QosReliability.RELIABLE, QosDurability.VOLATILE
+)
+EXPERIMENT_QOS = stated_qos(
+    QosHistory.KEEP_LAST, 1, QosReliability.RELIABLE, QosDurability.TRANSIENT_LOCAL
+)
 
 
 class BagWriter:

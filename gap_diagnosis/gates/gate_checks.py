@@ -122,6 +122,14 @@ def _gate(
     return Gate(name=name, passed=passed, value=value, limit=limit, sentence=sentence, hint=hint)
 
 
+def _limited(
+    name: str, value: float, limit: float, well: str, ill: str, hint: Hint = "bad_data"
+) -> Gate:
+    """Return a gate that passes up to a limit, with the sentence for what came of it."""
+    passed = bool(value <= limit)
+    return _gate(name, value, limit, well if passed else ill, passed, hint)
+
+
 def _whole(recorded: RecordedExperiment) -> Gate:
     bad = [
         f"{r.name}: {name}"
@@ -169,14 +177,14 @@ def _reference(recorded: RecordedExperiment) -> Gate:
         return float(np.std(kept - kept[-1]) / scale) if scale else np.inf
 
     value, worst = _worst(recorded, mismatch)
-    passed = value <= REFERENCE_LIMIT
-    sentence = (
-        "the reference repeats in every period."
-        if passed
-        else f"{worst.name}: the reference differs between periods by {value:.2g} of its rms; "
-        "correct samples_per_period or transient_periods."
+    return _limited(
+        "reference repeats",
+        value,
+        REFERENCE_LIMIT,
+        "the reference repeats in every period.",
+        f"{worst.name}: the reference differs between periods by {value:.2g} of its rms; correct "
+        "samples_per_period or transient_periods.",
     )
-    return _gate("reference repeats", value, REFERENCE_LIMIT, sentence, passed)
 
 
 def _periodic(recorded: RecordedExperiment) -> Gate:
@@ -193,15 +201,15 @@ def _periodic(recorded: RecordedExperiment) -> Gate:
     if description.periods < 2:
         return untested("periodic response", "two periods or more")
     value, worst = _worst(recorded, unexplained)
-    passed = value <= PERIODICITY_LIMIT
-    sentence = (
-        f"the response repeats from period to period; at most {value:.2g} of it is beyond noise."
-        if passed
-        else f"{worst.name}: the response is not periodic, {value:.2g} of its rms in the band "
-        f"differs from period to period beyond noise (false-alarm probability {FALSE_ALARM:g}); "
-        "lower the amplitude."
+    return _limited(
+        "periodic response",
+        value,
+        PERIODICITY_LIMIT,
+        f"the response repeats from period to period; at most {value:.2g} of it is beyond noise.",
+        f"{worst.name}: the response is not periodic, {value:.2g} of its rms in the band differs "
+        f"from period to period beyond noise (false-alarm probability {FALSE_ALARM:g}); lower the "
+        "amplitude.",
     )
-    return _gate("periodic response", value, PERIODICITY_LIMIT, sentence, passed)
 
 
 def _settled(recorded: RecordedExperiment) -> Gate:
@@ -216,14 +224,14 @@ def _settled(recorded: RecordedExperiment) -> Gate:
     if recorded.experiment.periods < 2:
         return untested("transient decayed", "two periods or more")
     value, worst = _worst(recorded, left)
-    passed = value <= TRANSIENT_LIMIT
-    sentence = (
-        "the transient has decayed before the kept periods begin."
-        if passed
-        else f"{worst.name}: {value:.2g} of y is still transient where the kept periods begin; "
-        "discard more periods."
+    return _limited(
+        "transient decayed",
+        value,
+        TRANSIENT_LIMIT,
+        "the transient has decayed before the kept periods begin.",
+        f"{worst.name}: {value:.2g} of y is still transient where the kept periods begin; discard "
+        "more periods.",
     )
-    return _gate("transient decayed", value, TRANSIENT_LIMIT, sentence, passed)
 
 
 def _stationary_over_periods(recorded: RecordedExperiment) -> Gate:
@@ -231,16 +239,17 @@ def _stationary_over_periods(recorded: RecordedExperiment) -> Gate:
     drift = period_drift(recorded)
     if drift is None:
         return untested(name, "two periods or more, and even lines that are not excited")
-    passed = drift.z <= PERIOD_Z_LIMIT
     level = recorded.levels[int(np.argmax(drift.per_level))]
-    sentence = (
-        "the response does not drift from period to period within a bag."
-        if passed
-        else f"the response drifts within bags ({drift.z:.0f} sigma, most at level {level}): its "
+    return _limited(
+        name,
+        drift.z,
+        PERIOD_Z_LIMIT,
+        "the response does not drift from period to period within a bag.",
+        f"the response drifts within bags ({drift.z:.0f} sigma, most at level {level}): its "
         f"excited lines change by {drift.relative:.2g} of themselves per period, lines without "
-        "excitation don't; let the rig warm up before recording."
+        "excitation don't; let the rig warm up before recording.",
+        "nonstationary",
     )
-    return _gate(name, drift.z, PERIOD_Z_LIMIT, sentence, passed, "nonstationary")
 
 
 def _controller(recorded: RecordedExperiment) -> Gate:

@@ -84,6 +84,12 @@ def run_parallel(run: Callable[[Any], np.ndarray], jobs: Sequence[Any]) -> list[
     return list(_POOL.map(run, jobs))
 
 
+def last_samples(model: Model, run: Trajectory, samples: int) -> np.ndarray:
+    """Return y, u and q at the end of a model's run, float64 (3, samples); of one body, q is th."""
+    link = run.motor if model.one_body else run.link
+    return np.array([signal[-samples:] for signal in (run.position, run.torque, link)])
+
+
 class Simulator:
     """Repeats a recorded experiment with a model, without noise.
 
@@ -169,8 +175,7 @@ class Simulator:
             run = self._simulated(model, self._inputs[index], self._elapsed[index])
         except InputError:
             return np.full((3, self._samples), np.nan)
-        link = run.motor if model.one_body else run.link
-        return np.array([s[-self._samples :] for s in (run.position, run.torque, link)])
+        return last_samples(model, run, self._samples)
 
     def _simulated(
         self, model: Model, inputs: tuple[np.ndarray, ...], elapsed_s: float

@@ -23,7 +23,7 @@ from fjr_records.spectra import line_spectrum
 from fjr_sim_node.simulation.closed_loop import simulate
 
 from ..model.misfit import MODEL_ERROR
-from ..model.simulated_rig import Model, run_parallel
+from ..model.simulated_rig import Model, last_samples, run_parallel
 from ..outcome.diagnosis import NextExperiment
 from ..which.fits import Fit
 from .trials import Trial, trials
@@ -165,8 +165,7 @@ class _Bench:
                 run = simulate(reference, self._rate, p, self._law, None, e)
             except InputError:
                 return np.full((3, self._samples), np.nan)
-            link = run.motor if model.one_body else run.link
-            return np.array([s[-self._samples :] for s in (run.position, run.torque, link)])
+            return last_samples(model, run, self._samples)
 
         return np.array(run_parallel(one, [trial.loaded(model) for model in models]))
 

@@ -46,9 +46,25 @@ def estimates(fit: Fit, groups: np.ndarray, moved: np.ndarray | float = 0.0) -> 
         prior[: len(space.nominal)] = (_NORMAL_95 / np.log1p(space.tolerance)) ** 2
     std = standard_errors(solution.jacobian, solution.residuals, groups, prior)
     std[: len(space.nominal)] *= WIDENING[min(len(fit.effects), len(WIDENING) - 1)]
-    std = np.hypot(std, moved)
-    ends = [np.clip(solution.x + sign * _NORMAL_95 * std, *space.bounds()) for sign in (-1, 1)]
-    low, high = (space.model(end) for end in ends)
+    found = linear_estimates(fit, np.hypot(std, moved))
+    for effect in fit.effects:
+        sizes = [name for name in fx.EFFECTS[effect].size_names if name in found]
+        if len(sizes) == 1 and effect in fit.without:
+            found[sizes[0]] = _beside_zero(found[sizes[0]], fit, fit.without[effect])
+    return found
+
+
+def linear_estimates(fit: Fit | CellFit, std: np.ndarray) -> dict[str, Estimate]:
+    """Return all free parameters of a fit with their 95 % intervals, cut at their bounds.
+
+    Args:
+        fit: an explanation.
+        std: (parameters,), standard deviations of its point.
+    """
+    x, space = fit.solution.x, fit.space
+    low, high = (
+        space.model(np.clip(x + sign * _NORMAL_95 * std, *space.bounds())) for sign in (-1, 1)
+    )
     found = {
         name: Estimate(value=fit.model.plant[name], low=low.plant[name], high=high.plant[name])
         for name in space.nominal
@@ -57,10 +73,6 @@ def estimates(fit: Fit, groups: np.ndarray, moved: np.ndarray | float = 0.0) -> 
         found[name] = Estimate(
             value=fit.model.effects[name], low=low.effects[name], high=high.effects[name]
         )
-    for effect in fit.effects:
-        sizes = [name for name in fx.EFFECTS[effect].size_names if name in found]
-        if len(sizes) == 1 and effect in fit.without:
-            found[sizes[0]] = _beside_zero(found[sizes[0]], fit, fit.without[effect])
     return found
 
 

@@ -17,11 +17,10 @@ from fjr_sim_node import effects as fx
 
 from ..outcome.diagnosis import Estimate
 from .cell_fits import CellFit, CellFitter
-from .estimates import moved_by_scatter, standard_errors
+from .estimates import linear_estimates, moved_by_scatter, standard_errors
 
 LEAST_INVARIANCE_P = 0.01
 _SAME = 0.05  # relative: sizes that differ by no more are the same, since friction scatters
-_NORMAL_95 = 1.96
 _AT_BOUND = 1e-3  # relative
 
 
@@ -35,21 +34,9 @@ def cell_estimates(
         fitter: that made it.
         scatter: standard deviations of parameters from run to run, see `moved_by_scatter`.
     """
-    solution, space = fit.solution, fit.space
-    std = standard_errors(solution.jacobian, solution.residuals, fitter.groups)
+    std = standard_errors(fit.solution.jacobian, fit.solution.residuals, fitter.groups)
     moved = moved_by_scatter(fit, fitter.runs, scatter)
-    std = np.hypot(std, moved)
-    ends = [np.clip(solution.x + sign * _NORMAL_95 * std, *space.bounds()) for sign in (-1, 1)]
-    low, high = (space.model(end) for end in ends)
-    found = {
-        name: Estimate(value=fit.model.plant[name], low=low.plant[name], high=high.plant[name])
-        for name in space.nominal
-    }
-    for name in space.effects:
-        found[name] = Estimate(
-            value=fit.model.effects[name], low=low.effects[name], high=high.effects[name]
-        )
-    return found
+    return linear_estimates(fit, np.hypot(std, moved))
 
 
 def beyond_zero(effect: str, found: dict[str, Estimate]) -> bool:

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 import rig_records as rigs
 
-from bla_analyzer.bla.arbitrary import ORDER, arbitrary_bla, run_of
+from bla_analyzer.bla.arbitrary import arbitrary_bla, run_of
 from bla_analyzer.bla.local_fit import fit_window
+from bla_analyzer.bla.windows import ORDER
 from fjr_kit.errors import InputError
 
 

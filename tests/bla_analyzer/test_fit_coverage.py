@@ -13,6 +13,7 @@ import pytest
 from drawn_bla import FREQUENCY_HZ, LINEAR, RATE_HZ, draw, linear_response
 
 from bla_analyzer.fit.described_model import Described, described
+from bla_analyzer.fit.likelihood import Task
 from bla_analyzer.fit.order_search import Tried, fit_order, tried
 from bla_analyzer.fit.order_tests import whiteness
 from bla_analyzer.fit.physical_fit import fit_physical
@@ -69,7 +70,7 @@ def in_ellipse(root, truth: complex) -> bool:
 def test_intervals_of_physical_parameters_hold_the_truth(outputs):
     held = []
     for samples in draws(outputs, 7, 60):
-        fit = tried("two-inertia", samples, fit_physical(samples, SEEN, "two-inertia"))
+        fit = tried("two-inertia", samples, fit_physical(Task(samples, SEEN), "two-inertia"))
         found = with_intervals(samples, fit)
         held.append([one.holds(LINEAR[name]) for name, one in found.parameters.items()])
     share = np.mean(held, axis=0)
@@ -83,7 +84,7 @@ def test_a_free_delay_is_found_with_its_interval():
     rng = np.random.default_rng(5)
     for _ in range(30):
         samples = samples_of(draw(late, 7, rng), 0, "drawn")
-        fit = tried("x", samples, fit_physical(samples, SEEN, "two-inertia", 0.0, True))
+        fit = tried("x", samples, fit_physical(Task(samples, SEEN, 0.0, True), "two-inertia"))
         held.append(with_intervals(samples, fit).delay_s.holds(2e-3))
     assert np.mean(held) >= 0.87
 
@@ -93,7 +94,7 @@ def test_the_joint_covariance_makes_two_outputs_tell_more_than_one():
     spread = []
     for link in (False, True):
         samples = samples_of(bla, 0, "drawn", link=link)
-        fit = tried("x", samples, fit_physical(samples, SEEN, "two-inertia"))
+        fit = tried("x", samples, fit_physical(Task(samples, SEEN), "two-inertia"))
         spread.append(with_intervals(samples, fit).parameters["j"].std)
     assert 0.5 * spread[0] < spread[1] < spread[0]
 

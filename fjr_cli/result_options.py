@@ -1,0 +1,32 @@
+"""Options of the commands that turn bags or parameters into results: where to, and about what."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import typer
+
+
+def results_folder(default: str) -> Any:
+    """Return the option --out of a command that fills a folder; `default` says which one else."""
+    return typer.Option(metavar="FOLDER", help=f"Folder of the results; default: {default}.")
+
+
+def effect_names(said: str, panel: str | None = None) -> Any:
+    """Return an option that takes names of effects, for `names_in`; `said` is its help."""
+    return typer.Option(metavar="NAME,NAME,...", help=said, rich_help_panel=panel)
+
+
+def datasheet_tolerance(panel: str | None = None) -> Any:
+    """Return the option --tolerance."""
+    return typer.Option(
+        min=0.001,
+        max=0.5,
+        help="How far a datasheet value may be off, relative.",
+        rich_help_panel=panel,
+    )
+
+
+def names_in(text: str | None) -> list[str] | None:
+    """Return the names of an option that separates them by commas; None if it is not given."""
+    return None if text is None else [name.strip() for name in text.split(",")]
