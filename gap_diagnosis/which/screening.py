@@ -23,6 +23,7 @@ from .search_space import Space, beside
 _SIZES = (0.1, 0.3, 3.0)  # of the size that the linear prediction asks for, tried after that
 _TRIED = 6
 _SCALED = 2
+_GREATEST = 1e15  # change of an error: a motion that diverges changes some by more
 _FOLLOW = 0.1  # how far a parameter of the parent may follow, relative
 
 Errors = Callable[[Sequence[Model]], np.ndarray]
@@ -64,7 +65,7 @@ class Screening:
         changes = errors([beside(model, seed) for seed in seeds]) - parent.residuals
         inverse = np.linalg.pinv(parent.jacobian, rcond=1e-6)
         self._candidates = _candidates(parent, seeds, changes, inverse)
-        self._changes = changes.astype(np.float32)
+        self._changes = np.clip(changes, -_GREATEST, _GREATEST).astype(np.float32)
         self._tries = _Tries(parent, model, inverse, space_of, errors)
 
     @property

@@ -47,8 +47,8 @@ class Gain:
     Attributes:
         mean: mean over unseen parts of the log-likelihood gained (nats).
         without_best: the same without the part that gains most.
-        share: of the parts that gain in the sum of ranks, ranked by how much each changes: a part at
-            rest shows little but where friction happened to stop the motion.
+        share: of the parts that gain in the sum of ranks, ranked by how much each changes: a part
+            at rest shows little but where friction happened to stop the motion.
         p: p-value of Wilcoxon's signed-rank test of these parts against no gain.
     """
 
