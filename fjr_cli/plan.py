@@ -186,10 +186,11 @@ def _foresee_bags(
 ) -> None:
     from fjr_records.periodic import RecordedExperiment
     from gap_diagnosis.any_record import read_any
-    from gap_diagnosis.model.nominal import read_nominal, refuse_wrong_units
+    from gap_diagnosis.model.nominal import read_nominal, refuse_too_stiff, refuse_wrong_units
 
     values = read_nominal(nominal)
     recorded = read_any(folder)
+    refuse_too_stiff(values, recorded.sample_rate_hz, nominal)
     if isinstance(recorded, RecordedExperiment):
         warning = refuse_wrong_units(recorded, values, nominal)
         if warning:
@@ -208,18 +209,22 @@ def _foresee_plan(
     from fjr_bringup.campaign.plan import Campaign
     from fjr_bringup.design.planned import planned_record
     from fjr_sim_node.plant import PLANT
-    from gap_diagnosis.model.nominal import read_nominal, refuse_effects
+    from gap_diagnosis.model.nominal import read_nominal, refuse_effects, refuse_too_stiff
 
+    source = nominal or options["rig"] or "the plan"
     campaign = described_campaign(options.pop("rig"), options.pop("settings"), None, **options)
     if nominal is not None:
         rig = {**campaign.values["simulator"], **read_nominal(nominal)}
         campaign = Campaign({**campaign.values, "simulator": rig})
-    refuse_effects(campaign.values["simulator"], "/rig/simulator")
+    where = f"{source}: /rig/simulator"
+    simulator = campaign.values["simulator"]
+    refuse_effects(simulator, where)
+    values = {name: float(simulator[name]) for name in PLANT.names}
+    refuse_too_stiff(values, simulator["sample_rate_hz"], where)
     controller, record, *_ = described
     runs, reference = None, None
     if controller is not None or record is not None:
         runs, reference = described_runs(campaign, *described)
-    values = {name: float(campaign.values["simulator"][name]) for name in PLANT.names}
     _foresee(
         planned_record(campaign, runs, reference),
         values,
@@ -249,7 +254,7 @@ def _foresee(
     with ProgressLine(transient=True) as progress:
         found = foresee(
             recorded, values, realizations=realizations, tolerance=tolerance, effects=effects,
-            progress=progress.count,
+            progress=progress.report,
         )  # fmt: skip
     if out is not None:
         with result_folder(out, ("plan.json",)) as place:
