@@ -41,6 +41,8 @@ def draw_levels(result: Result) -> Figure:
     top.set_ylabel("BLA (dB re 1 rad/(N m))")
     frequency_axis([top], result.levels[0].excited.frequency_hz)
     legend(top)
+    if not np.isfinite(_amplitudes(result)).any():
+        return figure
     left = figure.add_axes((0.1, 0.085, 0.265, 0.32))
     right = figure.add_axes((0.49, 0.085, 0.265, 0.32))
     _draw_v(left, result)
