@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from fjr_kit.check import Check
 from fjr_kit.errors import InputError
 from fjr_records.realization import TimeSignals
+from fjr_records.record_noise import stands_above_noise
 from fjr_records.records import Record, RecordSet
 from fjr_records.units import FOLLOWING_LIMIT, following, unit_sentence
 
@@ -42,7 +45,7 @@ def analyze_records(records: RecordSet, models: Sequence[ReferenceModel]) -> Res
     for level in records.levels:
         members = [i for i, record in enumerate(records.records) if record.level == level]
         groups = [[records.records[i] for i in g] for g in records.repeats if g[0] in members]
-        made, of_level = _level(level, groups, records.sample_rate_hz, models)
+        made, of_level = _level(level, groups, records, models)
         levels.append(made)
         checks += _checks(made, groups)
         notes += [f"level {level}: {note}" for note in of_level]
@@ -68,9 +71,10 @@ def analyze_records(records: RecordSet, models: Sequence[ReferenceModel]) -> Res
 def _level(
     level: int,
     groups: Sequence[Sequence[Record]],
-    sample_rate_hz: float,
+    records: RecordSet,
     models: Sequence[ReferenceModel],
 ) -> tuple[LevelResult, list[str]]:
+    sample_rate_hz = records.sample_rate_hz
     played = all(_is_played(record.reference) for group in groups for record in group)
     notes = [] if played else [_why_direct(groups)]
     parts = max(int(np.ceil(r.samples / MOST_SAMPLES)) for group in groups for r in group)
@@ -86,12 +90,23 @@ def _level(
     ]
     found = None
     try:
-        found = arbitrary_bla(runs, sample_rate_hz, slope=not played)
+        if played:
+            found = arbitrary_bla(runs, sample_rate_hz)
+        else:
+            own = replace(records, records=tuple(record for group in groups for record in group))
+            moves = partial(stands_above_noise, own)
+            found = _without_reference(arbitrary_bla(runs, sample_rate_hz, slope=True, moves=moves))
     except InputError as error:
         notes.append(str(error))
     else:
-        notes += _left_out(found) + (_shape(groups) if played else [])
+        notes += _left_out(found, played) + (_shape(groups) if played else [])
     return _result(level, groups, found, sample_rate_hz, models), notes
+
+
+def _without_reference(found: ArbitraryBla) -> ArbitraryBla:
+    """Return an estimate without the reference, for which the torque stood."""
+    unknown = np.full(found.levels.reference.shape, np.nan)
+    return replace(found, levels=found.levels.model_copy(update={"reference": unknown}))
 
 
 def _is_played(reference: np.ndarray | None) -> bool:
@@ -119,7 +134,7 @@ def _signals(record: Record, played: bool, part: int, parts: int) -> np.ndarray:
     return np.stack([u[1:], u[1:], np.diff(y)])
 
 
-def _left_out(found: ArbitraryBla) -> list[str]:
+def _left_out(found: ArbitraryBla, played: bool) -> list[str]:
     lost = found.left_out_hz
     if not lost.size:
         return []
@@ -134,10 +149,13 @@ def _left_out(found: ArbitraryBla) -> list[str]:
         )
         if part
     )
-    return [
-        f"{lost.size} of {whole} frequencies are left out ({bands}): the torque does not follow "
-        "the excitation beyond noise and distortion there."
-    ]
+    why = (
+        "the torque does not follow the excitation beyond noise and distortion there."
+        if played
+        else "position or torque do not stand above noise there, so that G would be that of the "
+        "controller."
+    )
+    return [f"{lost.size} of {whole} frequencies are left out ({bands}): {why}"]
 
 
 def _band(lost: np.ndarray, word: str = "") -> str:

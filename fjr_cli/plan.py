@@ -108,7 +108,8 @@ def plan(
         return
     own = described.own_settings(options)
     campaign = options.campaign(rig, without=own)
-    _foresee_plan(campaign, described, own, nominal, tolerance, asked, out)
+    source = str(nominal or rig or "the plan")
+    _foresee_plan(campaign, described, own, nominal, source, tolerance, asked, out)
 
 
 def _propose(
@@ -145,10 +146,11 @@ def _foresee_bags(
 ) -> None:
     from fjr_records.periodic import RecordedExperiment
     from gap_diagnosis.any_record import read_any
-    from gap_diagnosis.model.nominal import read_nominal, refuse_wrong_units
+    from gap_diagnosis.model.nominal import read_nominal, refuse_too_stiff, refuse_wrong_units
 
     values = read_nominal(nominal)
     recorded = read_any(folder)
+    refuse_too_stiff(values, recorded.sample_rate_hz, nominal)
     if isinstance(recorded, RecordedExperiment):
         warning = refuse_wrong_units(recorded, values, nominal)
         if warning:
@@ -161,6 +163,7 @@ def _foresee_plan(
     described: RunOptions,
     settings: list[str],
     nominal: str | None,
+    source: str,
     tolerance: float,
     effects: list[str] | None,
     out: Path | None,
@@ -168,14 +171,17 @@ def _foresee_plan(
     from fjr_bringup.campaign.plan import Campaign
     from fjr_bringup.design.planned import planned_record
     from fjr_sim_node.plant import PLANT
-    from gap_diagnosis.model.nominal import read_nominal, refuse_effects
+    from gap_diagnosis.model.nominal import read_nominal, refuse_effects, refuse_too_stiff
 
     if nominal is not None:
-        rig = {**campaign.values["simulator"], **read_nominal(nominal)}
-        campaign = Campaign({**campaign.values, "simulator": rig})
-    refuse_effects(campaign.values["simulator"], "/rig/simulator")
+        own = {**campaign.values["simulator"], **read_nominal(nominal)}
+        campaign = Campaign({**campaign.values, "simulator": own})
+    where = f"{source}: /rig/simulator"
+    simulator = campaign.values["simulator"]
+    refuse_effects(simulator, where)
+    values = {name: float(simulator[name]) for name in PLANT.names}
+    refuse_too_stiff(values, simulator["sample_rate_hz"], where)
     runs, reference = described.runs(campaign, settings) if described.given else (None, None)
-    values = {name: float(campaign.values["simulator"][name]) for name in PLANT.names}
     _foresee(
         planned_record(campaign, runs, reference),
         values,
@@ -205,7 +211,7 @@ def _foresee(
     with ProgressLine(transient=True) as progress:
         found = foresee(
             recorded, values, realizations=realizations, tolerance=tolerance, effects=effects,
-            progress=progress.count,
+            progress=progress.report,
         )  # fmt: skip
     if out is not None:
         with result_folder(out, ("plan.json",)) as place:

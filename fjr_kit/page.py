@@ -89,7 +89,14 @@ def render_page(
         values: what else the template shows, as data.
     """
     page = _environment(package).get_template(template)
-    return page.render(title=title, plots=plots, provenance=provenance, **values)
+    shown = [plot for group in (plots["overview"], *plots["levels"]) for plot in group.values()]
+    return page.render(
+        title=title,
+        plots=plots,
+        over_frequency=any("linked" in plot for plot in shown),
+        provenance=provenance,
+        **values,
+    )
 
 
 def asset(name: str) -> str:

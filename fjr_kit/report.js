@@ -52,14 +52,20 @@
   const inUnit = (text) => text?.replaceAll(" Hz<", ` ${unit}<`);
   const scaled = (values) => values.map((v) => (v === null ? null : v * factor()));
 
+  // The lowest and the highest frequency of a plot (Hz), zero left out.
+  const bandOf = (plot) => plot.data.flatMap((trace) => trace.x).filter((f) => f > 0)
+    .reduce(([low, high], f) => [Math.min(low, f), Math.max(high, f)], [Infinity, 0]);
+
   // The axis of a plot over frequency, which is made in Hz, by the switches and the reader's band.
-  const frequencyAxis = ({type, dtick, tickformat, range, ...axis}) => {
+  const frequencyAxis = (plot) => {
+    const {type, dtick, tickformat, range, ...axis} = plot.layout.xaxis;
     const log = isLog({type});
     const shown = band ?? (log && range ? range.map((v) => 10 ** v) : null);
     const change = {title: {text: unit === "Hz" ? "frequency (Hz)" : "angular frequency (rad/s)"}};
     if (log) {
+      const [low, high] = shown ?? bandOf(plot);
       Object.assign(change, {type: "log", tickformat: "~g"});
-      if (!shown || shown[1] > 20 * shown[0]) change.dtick = 1;
+      if (high > 3 * low) change.dtick = high > 20 * low ? 1 : "D2";
     }
     if (shown) change.range = scaled(shown).map((v) => (log ? Math.log10(v) : v));
     return {...axis, ...change};
@@ -79,7 +85,7 @@
     if (plot.plane) return {...plot, data: plot.data.map(inBand)};
     if (!plot.linked) return plot;
     const data = plot.data.map((trace) => ({...trace, x: scaled(trace.x), hovertemplate: inUnit(trace.hovertemplate)}));
-    return {...plot, data, layout: {...plot.layout, xaxis: frequencyAxis(plot.layout.xaxis)}};
+    return {...plot, data, layout: {...plot.layout, xaxis: frequencyAxis(plot)}};
   };
 
   // What a change of the view says about x: a new range, null for the whole, undefined for nothing.
@@ -113,7 +119,7 @@
       draw(place);
     });
     Promise.all(followers.map((place) => {
-      const {range, dtick} = frequencyAxis(plotFor(place).layout.xaxis);
+      const {range, dtick} = frequencyAxis(plotFor(place));
       const axis = range ? {"xaxis.range": range} : {"xaxis.autorange": true};
       return Plotly.relayout(place, {...axis, "xaxis.dtick": dtick ?? null});
     })).finally(() => { linking = false; });
@@ -144,6 +150,7 @@
       else part.hidden = !own;
     });
     drawAll();
+    press();
     if (page.levels.length > 1) history.replaceState(null, "", `#level=${index}`);
   };
 
@@ -174,7 +181,6 @@
 
   const wanted = Number(/^#level=(\d+)$/.exec(location.hash)?.[1] ?? 0);
   select(wanted < page.levels.length ? wanted : 0);
-  press();
   document.querySelectorAll("[id^=all-]").forEach((place) =>
     place.on?.("plotly_click", (event) => {
       const {meta} = event.points[0].data;

@@ -79,6 +79,11 @@ class RecordedExperiment:
         """The description of the first realization; grid, rate and controller are common to all."""
         return self.realizations[0].experiment
 
+    @property
+    def sample_rate_hz(self) -> float:
+        """Rate of the samples."""
+        return self.experiment.sample_rate_hz
+
     @cached_property
     def levels(self) -> tuple[int, ...]:
         """The levels that are there, ascending."""
@@ -122,7 +127,7 @@ class RecordedExperiment:
             )
             for r in self.realizations
         )
-        return RecordSet(self.source, self.experiment.sample_rate_hz, records, self.notes)
+        return RecordSet(self.source, self.sample_rate_hz, records, self.notes)
 
     def kinds(self) -> np.ndarray:
         """Return the kind of each line, str (lines,): excited, odd, even or dc.

@@ -14,6 +14,7 @@ from itertools import pairwise
 from typing import Literal
 
 import numpy as np
+from scipy.signal import welch
 
 from fjr_interface.experiment import Experiment
 
@@ -23,6 +24,9 @@ NoiseSource = Literal["repeats", "standstill", "residual", "none"]
 
 _TOP = 0.75  # of the lines, above which only noise is expected
 _FLAT = 2.0  # greatest ratio of power between the halves of these lines that counts as flat
+_ABOVE = 4.0  # times the power of noise, from which a line holds a signal
+_SEGMENTS, _LEAST_SEGMENT = 8, 256  # of a record, whose spectra are averaged; samples of one
+_LINE = 4  # bins from the middle of a line to its end in the spectrum's window
 _STILL_S = 0.2
 _STILL = 1e-3  # of the travelled range: the most that a standing axis moves
 _LEAST_STILL = 50  # samples
@@ -58,6 +62,30 @@ def record_noise(records: RecordSet) -> RecordNoise:
     if found:
         return RecordNoise("residual", float(np.median(found)))
     return RecordNoise("none", float("nan"))
+
+
+def stands_above_noise(records: RecordSet, frequency_hz: np.ndarray) -> np.ndarray:
+    """Return at which frequencies the position of some record holds more than its noise, bool (F,).
+
+    Everywhere, if the noise is not known. The ends of the band are known to the width of a line of
+    the spectrum's window, which is taken off.
+    """
+    noise, rate = record_noise(records), records.sample_rate_hz
+    if not noise.known:
+        return np.ones(frequency_hz.shape, bool)
+    above = np.zeros(frequency_hz.shape, bool)
+    for record in records.records:
+        length = min(max(record.samples // _SEGMENTS, _LEAST_SEGMENT), record.samples)
+        at, density = welch(record.position, rate, "blackmanharris", length, detrend="linear")
+        limit = _ABOVE * 2.0 * noise.std_rad**2 / rate
+        held = np.flatnonzero(density > limit)
+        if not held.size:
+            continue
+        low = at[held[0] + _LINE] if held[0] > _LINE else 0.0
+        high = at[held[-1] - _LINE] if held[-1] < at.size - _LINE else at[-1]
+        inside = (frequency_hz >= low) & (frequency_hz <= high)
+        above |= inside & (np.interp(frequency_hz, at, density) > limit)
+    return above
 
 
 def _between_repeats(records: RecordSet) -> list[np.ndarray]:
@@ -143,7 +171,7 @@ def band_lines(power: Sequence[float] | np.ndarray, noise_power: float, least: i
         least: fewest lines to return.
     """
     power = np.asarray(power)
-    floor = 4.0 * noise_power if np.isfinite(noise_power) else 1e-12 * power.max(initial=0.0)
+    floor = _ABOVE * noise_power if np.isfinite(noise_power) else 1e-12 * power.max(initial=0.0)
     smooth = np.convolve(power, np.ones(5) / 5.0, "same")
     above = np.flatnonzero(smooth > floor)
     last = int(above[-1]) + 1 if above.size else 0

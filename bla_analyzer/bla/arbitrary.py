@@ -8,7 +8,7 @@ reference is not independent of it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -92,6 +92,7 @@ def arbitrary_bla(
     sample_rate_hz: float,
     *,
     slope: bool = False,
+    moves: Callable[[np.ndarray], np.ndarray] | None = None,
     at_hz: np.ndarray | None = None,
 ) -> ArbitraryBla:
     """Estimate the BLA from the runs of one level, with its uncertainty.
@@ -100,6 +101,8 @@ def arbitrary_bla(
         runs: one for each reference, see `run_of`.
         sample_rate_hz: rate of the samples.
         slope: whether the position in `runs` is y[k] - y[k-1] and not y[k].
+        moves: tells at which frequencies (F,) the position stands above its noise, bool (F,), where
+            the torque stands for the reference; elsewhere the loop would show -1/C.
         at_hz: (F,), where the estimate is asked for, whether excited or not; None chooses.
 
     Returns:
@@ -116,6 +119,8 @@ def arbitrary_bla(
     ]
     asked = at_hz is not None
     kept = np.array([fit is not None and (asked or _is_excited(fit)) for fit in fits])
+    if moves is not None and not asked:
+        kept &= moves(grid)
     if not kept.any():
         raise InputError(
             "at no frequency does the torque follow the reference beyond noise; excite more, or "

@@ -36,6 +36,7 @@ from ..results.summary import (
     magnitude_band_db,
     phase_deg,
     phase_reach_deg,
+    shown_signals,
     signal_at,
     significant,
     total_distortion,
@@ -136,15 +137,16 @@ def _draw_uncertainties(axis: Axes, bla: BlaEstimate) -> None:
 
 def draw_spectra(level: LevelResult) -> Figure:
     """Draw reference, torque and position at excited, odd and even lines (paper Figs. 5, 7-9)."""
-    figure, axes = stacked_axes(3, 6.0, f"Spectra, {level_name(level)}", (1, 1, 1))
-    rows = (("reference", "rad"), ("torque", "N m"), ("position", "rad"))
+    rows = shown_signals(level)
+    count = len(rows)
+    figure, axes = stacked_axes(count, 2.0 * count, f"Spectra, {level_name(level)}", (1,) * count)
     for axis, (name, unit) in zip(axes, rows, strict=True):
         for lines, label, style in _kinds(level):
             values = decibel(signal_at(level, lines, name))
             if np.isfinite(values).any():
                 axis.plot(lines.frequency_hz, values, label=label, **style)
         axis.set_ylabel(f"{name} (dB re 1 {unit})")
-    _draw_noise(axes[2], (level.excited,))
+    _draw_noise(axes[-1], (level.excited,))
     frequency_axis(axes, level.excited.frequency_hz)
     legend(axes[0], *axes[1:])
     return figure

@@ -37,8 +37,13 @@ SMALLEST_RATIO = 1e-3
 
 
 def draw_levels(result: Result) -> Figure:
-    """Draw the BLA of all levels, and V and distortion against amplitude (paper Fig. 4)."""
-    figure, [top] = stacked_axes(1, 5.4, "All levels", (1,), bottom_in=2.85)
+    """Draw the BLA of all levels, and V and distortion against amplitude (paper Fig. 4).
+
+    Without a reference no amplitude is known, and the BLA stands alone.
+    """
+    played = bool(np.isfinite(amplitudes_rad(result)).any())
+    height, below = (5.4, {"bottom_in": 2.85}) if played else (3.2, {})
+    figure, [top] = stacked_axes(1, height, "All levels", (1,), **below)
     for level, shade in zip(result.levels, _shades(len(result.levels)), strict=True):
         if level.bla is not None:
             ends = magnitude_band_db(level.bla.g, level.bla.radius_95)
@@ -48,6 +53,8 @@ def draw_levels(result: Result) -> Figure:
     top.set_ylabel("BLA (dB re 1 rad/(N m))")
     frequency_axis([top], result.levels[0].excited.frequency_hz)
     legend(top)
+    if not played:
+        return figure
     left = figure.add_axes((0.1, 0.085, 0.265, 0.32))
     right = figure.add_axes((0.49, 0.085, 0.265, 0.32))
     _draw_v(left, result)

@@ -34,9 +34,9 @@ def overview_plots(result: Result) -> dict[str, Plot]:
         "all-bla": _all_bla(result, f),
         "all-coherence": _all_coherence(result, f),
         "all-sensitivity": _all_sensitivity(result, f),
-        "all-v": _all_v(result),
-        "all-power": _all_power(result),
     }
+    if np.isfinite(amplitudes_rad(result)).any():
+        plots |= {"all-v": _all_v(result), "all-power": _all_power(result)}
     return {name: plot for name, plot in plots.items() if plot["data"]}
 
 

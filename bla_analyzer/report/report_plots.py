@@ -29,6 +29,7 @@ from ..results.summary import (
     magnitude_band_db,
     phase_deg,
     phase_reach_deg,
+    shown_signals,
     signal_at,
     significant,
     total_distortion,
@@ -143,8 +144,9 @@ def _uncertainties(bla: BlaEstimate) -> list[Trace]:
 
 def _spectra(level: LevelResult) -> Plot:
     """Return the spectra of reference, torque and position by kind of line."""
-    traces, titles, named = _noise((level.excited,), row=3), [], set()
-    rows = (("reference", "rad"), ("torque", "N m"), ("position", "rad"))
+    titles, named = [], set()
+    rows = shown_signals(level)
+    traces = _noise((level.excited,), row=len(rows))
     for row, (signal, unit) in enumerate(rows, start=1):
         titles.append(f"{signal} (dB re 1 {unit})")
         for kind, name, color, symbol in reversed(KINDS):
@@ -155,7 +157,7 @@ def _spectra(level: LevelResult) -> Plot:
                 f, note = lines.frequency_hz, f"dB re 1 {unit}"
                 traces.append(trace(f, y, name, color, **mark, unit=note))
                 named.add(name)
-    return linked(traces, titles, [1.0, 1.0, 1.0], level.excited.frequency_hz)
+    return linked(traces, titles, [1.0] * len(rows), level.excited.frequency_hz)
 
 
 def _noise(kinds: tuple[LineLevels, ...], row: int) -> list[Trace]:

@@ -80,6 +80,12 @@ def signal_at(level: LevelResult, lines: LineLevels, signal: str) -> np.ndarray:
     return np.where(values > floor, values, np.nan)
 
 
+def shown_signals(level: LevelResult) -> list[tuple[str, str]]:
+    """Return the signals whose spectra are known, with units; position is the last."""
+    played = np.isfinite(level.excited.reference).any()
+    return [("reference", "rad")] * bool(played) + [("torque", "N m"), ("position", "rad")]
+
+
 def significant(bla: BlaEstimate) -> np.ndarray:
     """Return where the nonlinear variance is positive and significant, bool (F,)."""
     return (bla.nonlinear_p_value < SIGNIFICANCE) & (bla.var_nonlinear > 0)

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from fjr_kit.page import Row, check_rows, render_page
-from fjr_kit.plots import SECONDS, Options, Plot, extremes, frequency_layout, layout, stack, trace
+from fjr_kit.plots import SECONDS, Options, Plot, extremes, layout, linked, stack, trace
 
 from .prediction import Prediction
 from .result import Rehearsal, milliseconds
@@ -146,4 +146,4 @@ def _bias(prediction: Prediction) -> Plot:
         style: Options = {"dash": "solid", "row": row, "showlegend": False}
         traces.append(trace(f, values, name, "--excited", **style, unit=unit))
     titles = [f"{name} ({unit})" for name, _, unit in rows]
-    return {"data": traces, "layout": frequency_layout(titles, [1.0, 1.0], f)}
+    return linked(traces, titles, [1.0, 1.0], f, on_top="first")

@@ -35,6 +35,9 @@ class Sight(Protocol):
     def errors(self, models: Sequence[Model]) -> np.ndarray:
         """Return errors of models over their standard deviation, float64 (models, errors)."""
 
+    def too_stiff(self, model: Model) -> bool:
+        """Tell whether a model would take too long to play."""
+
     def strength(self, change: np.ndarray) -> float:
         """Return how far a change shows, over what the diagnosis needs to name an effect."""
 

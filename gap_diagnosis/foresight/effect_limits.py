@@ -29,11 +29,13 @@ _MOST = 20.0  # times what the slope of a shape promises
 _LOOSE, _TIGHT = 5.0, 0.02  # limits of a drive that are tried, times the greatest torque
 _REFITTED = 0.9  # of what slopes promise must be left by a refit for them to count
 _TOLD = 0.5  # of an effect that another one must leave to be told from it, up to twice the limit
+_NEAR = 0.1  # logarithm of the factor within which the end of a range is found
 _SCALED = ("size", "harmonic")
 
 _SEEN_DIRECTLY = "Seen in the samples themselves, as soon as one count exceeds the noise."
 _ONLY_A_GATE = "A gate looks for it between runs, no fit does."
-_TOO_SMALL = "It does not show at any size that a fit may take."
+_TOO_SMALL = "It does not show at any size that a fit may take and that can be simulated."
+_TOO_STIFF = "Beside this nominal it moves too fast to be simulated at the rate of the samples."
 
 
 @dataclass(frozen=True)
@@ -95,6 +97,8 @@ class EffectLimits:
         if why:
             return _without(effect, parameter, why)
         shapes = self._shapes[effect] = self._screened(effect)
+        if not shapes:
+            return _without(effect, parameter, _TOO_STIFF)
         order = sorted(shapes, key=self._promise)
         best = next((found for s in order[:3] if (found := self._limit(s))), None)
         if best is None:
@@ -150,7 +154,10 @@ class EffectLimits:
 
     def _screened(self, effect: str) -> list[Shape]:
         """Return the shapes of an effect, each from the start whose slope tells its limit best."""
-        seeds = starts(effect, self._sight.scales, nominal=self._nominal.plant)
+        every = starts(effect, self._sight.scales, nominal=self._nominal.plant)
+        seeds = [one for one in every if not self._sight.too_stiff(beside(self._nominal, one))]
+        if not seeds:
+            return []
         changes = self._sight.errors([beside(self._nominal, seed) for seed in seeds]) - self._bare
         found: dict[tuple, Shape] = {}
         for seed, change in zip(seeds, changes, strict=True):
@@ -184,21 +191,42 @@ class EffectLimits:
         least, most = self._range(shape)
         if fx.parameter(shape.lead).role != "limit":  # a limit is felt from one size on
             most = min(most, _MOST * max(1.0 / shape.strength, least))
-        slopes = self._searched(shape, 1.0 / shape.strength, most, self._by_slopes)
+        ends = least, most = self._followed(shape, least), self._followed(shape, most)
+        slopes = self._searched(shape, 1.0 / shape.strength, ends, self._by_slopes)
         if slopes is None:
             return None
-        left = self._by_refit(shape, slopes)
-        if not _REFITTED < self._sight.strength(left) < 1.0 / _REFITTED:
-            found = self._searched(shape, slopes, most, self._by_refit)
+        factor = max(slopes, least)
+        left = self._by_refit(shape, factor)
+        if not _REFITTED < self._sight.strength(left) * slopes / factor < 1.0 / _REFITTED:
+            found = self._searched(shape, slopes, ends, self._by_refit)
             if found is None:
                 return None
-            slopes, left = found, self._by_refit(shape, found)
-        return Limit(shape, max(slopes, least), left)
+            factor = max(found, least)
+            left = self._by_refit(shape, factor)
+        return Limit(shape, factor, left)
+
+    def _followed(self, shape: Shape, end: float) -> float:
+        """Return a factor, or the one nearest to it at which the motion can be followed.
+
+        A start can be; so it is searched for between 1 and that end.
+        """
+        if not self._sight.too_stiff(beside(self._nominal, shape.at(end))):
+            return end
+        good, bad = 1.0, end
+        while abs(math.log(bad / good)) > _NEAR:
+            middle = math.sqrt(good * bad)
+            stiff = self._sight.too_stiff(beside(self._nominal, shape.at(middle)))
+            good, bad = (good, middle) if stiff else (middle, bad)
+        return good
 
     def _searched(
-        self, shape: Shape, start: float, most: float, left: Callable[[Shape, float], np.ndarray]
+        self,
+        shape: Shape,
+        start: float,
+        ends: tuple[float, float],
+        left: Callable[[Shape, float], np.ndarray],
     ) -> float | None:
-        least = self._range(shape)[0]
+        least, most = ends
 
         def shown(factor: float) -> float:
             """Return how far it shows; below what counts as off, in proportion."""

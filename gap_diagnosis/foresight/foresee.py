@@ -8,6 +8,7 @@ from fjr_records.periodic import RecordedExperiment
 from fjr_records.records import RecordSet
 from fjr_sim_node import effects as fx
 
+from ..model.nominal import refuse_too_stiff
 from ..model.simulated_rig import Model
 from ..which.catalogue import catalogue
 from ..which.scales import Scales
@@ -55,8 +56,9 @@ def foresee(
 
     Raises:
         InputError: an effect of an unknown name, a controller of an unknown kind, or a nominal
-            simulation that diverges.
+            that moves too fast to be simulated at the rate of the samples, or diverges.
     """
+    refuse_too_stiff(nominal, recorded.sample_rate_hz, "nominal")
     bare = Model.nominal(nominal)
     names = catalogue(bare.plant, effects)
     if effects is None or "nonstationary" in effects:

@@ -12,7 +12,7 @@ from fjr_records.noise import NoiseLevels, even_lines_as_noise
 from fjr_records.periodic import RecordedExperiment
 
 from ..model.misfit import Misfit
-from ..model.simulated_rig import Model, Simulator
+from ..model.simulated_rig import Model, Simulator, too_stiff
 from ..which.attribution import CERTAIN, SMALL_GAIN
 from ..which.scales import Scales
 
@@ -46,7 +46,7 @@ class PeriodicSight:
         self.noise_known = noise is not None
         std = (noise or even_lines_as_noise(recorded)).of_outputs(recorded)
         self.scales = Scales.of_experiment(recorded, nominal.plant)
-        self._recorded = recorded
+        self._recorded, self._simulator = recorded, simulator
         runs = recorded.realizations
         members = {at: [i for i, r in enumerate(runs) if r.level == at] for at in recorded.levels}
         seen = [i for chosen in members.values() for i in chosen[:REALIZATIONS]]
@@ -66,6 +66,12 @@ class PeriodicSight:
     def errors(self, models: Sequence[Model]) -> np.ndarray:
         """Return the error vectors of models, as `Misfit.errors`, float64 (models, errors)."""
         return self._misfit.errors(models)
+
+    def too_stiff(self, model: Model) -> bool:
+        """Tell whether a model would take too long to play."""
+        speed, torque = self.scales.velocity_rad_s, self.scales.peak_torque_nm
+        rate = self._recorded.sample_rate_hz
+        return too_stiff(model, self._simulator.samples, rate, speed, torque)
 
     def strength(self, change: np.ndarray) -> float:
         """Return how far a change shows, over what the diagnosis needs to name an effect.

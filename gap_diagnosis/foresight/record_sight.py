@@ -75,6 +75,11 @@ class RecordSight:
         """Return errors over their standard deviation, float64 (models, errors)."""
         return self._evidence.errors(models, self._parts) / self._std
 
+    def too_stiff(self, model: Model) -> bool:
+        """Tell whether a model would take too long to play in one of the records."""
+        simulator = self._evidence.simulator
+        return any(simulator.too_stiff(model, i) for i in range(len(simulator.records.records)))
+
     def strength(self, change: np.ndarray) -> float:
         """Return how far a change shows, over what the diagnosis needs to name an effect.
 

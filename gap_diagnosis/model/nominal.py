@@ -21,7 +21,7 @@ from fjr_sim_node import effects as fx
 from fjr_sim_node.plant import PLANT
 from fjr_sim_node.simulation.simulator import SIMULATOR
 
-from .simulated_rig import Model, Simulator
+from .simulated_rig import Model, Simulator, steps_a_sample
 
 PAPER = "paper"
 """Names the paper's values."""
@@ -30,6 +30,10 @@ FAR_OFF = 0.7
 """Distance of torque-to-position responses beyond which a wrong unit is looked for, in ln|G|."""
 MUCH_NEARER = 0.4
 """A unit explains the record if the distance in it is below this share of the distance without."""
+
+TOO_STIFF = 20.0
+"""Steps that the integration of a sample may take at the most: motion of 4 rad in a sample, which
+is beyond what samples can show of an oscillation."""
 
 _DEGREE = math.pi / 180.0
 _VISCOUS_UNITS = {"mN m s/rad": 1e-3}
@@ -89,6 +93,33 @@ def refuse_effects(values: Mapping[str, object], where: str) -> None:
                     f"{where}: {name} switches an effect on; take it out, the nominal is the bare "
                     "plant and the diagnosis itself looks for effects."
                 )
+
+
+def refuse_too_stiff(nominal: Mapping[str, float], sample_rate_hz: float, where: str) -> None:
+    """Raise InputError if the bare plant moves too fast to be played at a sample rate.
+
+    Args:
+        nominal: values of PLANT.
+        sample_rate_hz: rate of the samples.
+        where: place of the values, for the sentence.
+    """
+    model = Model.nominal(nominal)
+    if steps_a_sample(model, sample_rate_hz) <= TOO_STIFF:
+        return
+    given = model.plant
+    pairs = [("fvm", "jm", 1.0), ("fv", "j", 1.0), ("k0", "jm", 0.5), ("k0", "j", 0.5)]
+    rate, above, below, power = max(
+        ((given[above] / given[below]) ** power, above, below, power)
+        for above, below, power in pairs
+        if above in given and below in given
+    )
+    quotient = f"{above} / {below}" if power == 1.0 else f"the root of {above} / {below}"
+    rigid = ", or give .inf as k0 for a rigid axis" if above == "k0" else ""
+    raise InputError(
+        f"{where}: {quotient} is {rate:.3g} 1/s, a motion too fast to be simulated at "
+        f"{sample_rate_hz:g} samples a second; check values and units of {above} and {below}"
+        f"{rigid}."
+    )
 
 
 def refuse_wrong_units(

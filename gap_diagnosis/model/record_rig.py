@@ -15,17 +15,15 @@ from controller_node.transfer_function import TransferFunction
 from fjr_kit.errors import InputError
 from fjr_records.record_noise import RecordNoise
 from fjr_records.records import Record, RecordSet
-from fjr_sim_node import plant
 from fjr_sim_node.simulation.closed_loop import Trajectory, simulate_law
 
 from .prediction import CROSSOVER_SHARE, model_observer
 from .record_loop import RecordLoop, loop_of
-from .simulated_rig import Model, run_parallel
+from .simulated_rig import Model, run_parallel, too_stiff
 
 _AT_REST = 5.0  # standard deviations of noise that a record at rest may begin away from zero
 _FIRST_SAMPLES, _HIGHEST_DEGREE = 10, 4
 _ONLY_NOISE = 1.1  # standard deviations that a fit to the first samples leaves by chance
-_MOST_STEPS, _MOST_STEPS_A_SAMPLE = 1e6, 20.0  # of the integration of one run
 
 
 @dataclass(frozen=True)
@@ -161,7 +159,7 @@ class RecordSimulator:
 
     def _one(self, job: tuple[Model, int]) -> np.ndarray:
         model, index = job
-        if self._too_stiff(model, index):
+        if self.too_stiff(model, index):
             return np.full((3, self.records.records[index].samples), np.nan)
         try:
             run = self.drive(index).simulated(self._rate, *_coefficients(model))
@@ -169,12 +167,10 @@ class RecordSimulator:
             return np.full((3, self.records.records[index].samples), np.nan)
         return np.array([run.position, run.torque, run.motor if model.rigid else run.link])
 
-    def _too_stiff(self, model: Model, index: int) -> bool:
+    def too_stiff(self, model: Model, index: int) -> bool:
         """Tell whether a model would take so long to play as no record can call for."""
-        record, (p, e) = self.records.records[index], _coefficients(model)
-        seconds = record.samples / self._rate
-        steps = seconds * plant.steps_per_second(self._speeds[index], self._torques[index], p, e)
-        return bool(steps > max(_MOST_STEPS, _MOST_STEPS_A_SAMPLE * record.samples))
+        samples = self.records.records[index].samples
+        return too_stiff(model, samples, self._rate, self._speeds[index], self._torques[index])
 
 
 def _coefficients(model: Model) -> tuple[tuple[float, ...], np.ndarray | None]:

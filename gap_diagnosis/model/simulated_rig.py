@@ -24,6 +24,7 @@ from . import prediction
 Signals = tuple[np.ndarray, np.ndarray]
 """One steady period of y (rad) and of u (N m) of every realization, float64 (n, N) each."""
 
+_MOST_STEPS, _MOST_STEPS_A_SAMPLE = 1e6, 20.0  # of the integration of one run
 _POOL = ThreadPoolExecutor(len(os.sched_getaffinity(0)))
 
 
@@ -90,6 +91,37 @@ def last_samples(model: Model, run: Trajectory, samples: int) -> np.ndarray:
     return np.array([signal[-samples:] for signal in (run.position, run.torque, link)])
 
 
+def steps_a_sample(
+    model: Model, sample_rate_hz: float, speed: float = 0.0, torque: float = 0.0
+) -> float:
+    """Return how many steps the integration of a sample takes.
+
+    Args:
+        model: the model.
+        sample_rate_hz: rate of the samples.
+        speed: of the motor (rad/s).
+        torque: motor torque (N m).
+    """
+    p, e = model.plant_coefficients, model.effect_coefficients
+    return plant.steps_per_second(speed, torque, p, e) / sample_rate_hz
+
+
+def too_stiff(
+    model: Model, samples: int, sample_rate_hz: float, speed: float, torque: float
+) -> bool:
+    """Tell whether a model would take so long to play as no record can call for.
+
+    Args:
+        model: the model.
+        samples: of the run.
+        sample_rate_hz: their rate.
+        speed: rms speed of the motor (rad/s).
+        torque: greatest torque (N m).
+    """
+    steps = samples * steps_a_sample(model, sample_rate_hz, speed, torque)
+    return steps > max(_MOST_STEPS, _MOST_STEPS_A_SAMPLE * samples)
+
+
 class Simulator:
     """Repeats a recorded experiment with a model, without noise.
 
@@ -113,6 +145,11 @@ class Simulator:
         self._periods = max(description.transient_periods, 1) + 1
         self._inputs = [self._mean_inputs(realization) for realization in recorded.realizations]
         self._elapsed = [realization.experiment.elapsed_s for realization in recorded.realizations]
+
+    @property
+    def samples(self) -> int:
+        """How many samples of a realization are simulated."""
+        return self._periods * self._samples
 
     def many(self, models: Sequence[Model], which: Sequence[int] | None = None) -> np.ndarray:
         """Return one steady period of the measured outputs for each model.
@@ -156,11 +193,10 @@ class Simulator:
 
     def _mean_inputs(self, realization: RecordedRealization) -> tuple[np.ndarray, ...]:
         """Return what drives the simulation, periods after each other: r, or y and u."""
-        samples = self._periods * self._samples
         if self.repeats:
-            return (np.resize(realization.played.ravel(), samples),)
+            return (np.resize(realization.played.ravel(), self.samples),)
         signals = (realization.position, realization.torque)
-        return tuple(np.resize(realization.kept(s).mean(axis=0), samples) for s in signals)
+        return tuple(np.resize(realization.kept(s).mean(axis=0), self.samples) for s in signals)
 
     def _run(self, models: Sequence[Model], which: Sequence[int] | None) -> np.ndarray:
         """Return y, u and q, float64 (models, n, 3, N)."""

@@ -45,8 +45,8 @@ def _bla(found: LevelComparison) -> Plot:
         y = decibel(rig.radius_95)
         disc: Options = {"dash": "solid", "row": 3, "unit": "dB"}
         traces.append(trace(f, y, "95 % disc of the rig's BLA", "--radius", **disc))
-    unit = "dB re 1 rad/(N m)"
-    titles = [f"magnitude ({unit})", "phase (degrees)", f"|model \N{MINUS SIGN} rig| ({unit})"]
+    distance = "|model \N{MINUS SIGN} rig| (dB)"
+    titles = ["magnitude (dB re 1 rad/(N m))", "phase (degrees)", distance]
     return linked(traces, titles, [1.4, 1.0, 1.2], f)
 
 

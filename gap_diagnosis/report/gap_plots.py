@@ -57,7 +57,7 @@ def where_plot(maps: Mapping[str, ResidualMap], signal: Signal) -> Plot:
             "ticktext": [f"{kind} {found.amplitudes_rad[row]:.2g}" for row, kind in rows],
             "range": [-0.6, len(rows) - 0.4],
         }
-    return {"data": traces, "layout": axes | BARRED}
+    return {"data": traces, "layout": axes | BARRED, "linked": True}
 
 
 def _map_trace(

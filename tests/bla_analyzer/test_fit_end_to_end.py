@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from drawn_bla import LINEAR
+from html_page import Page
 from motor_bench import NEEDS_RECORDS, imported
 from scipy.io import loadmat
 
@@ -111,7 +112,10 @@ def test_a_discrete_model_has_the_same_poles(linear, both):
 def test_all_files_come_and_read_back(both, linear, tmp_path):
     page = write_fit(both, tmp_path / "fit")
     folder = page.parent
-    assert page.name == "fit.html" and "Two-inertia model" in page.read_text("utf-8")
+    text = page.read_text("utf-8")
+    assert page.name == "fit.html" and "Two-inertia model" in text
+    assert [plots["fit"]["linked"] for plots in Page(text).data()["levels"]] == [True]
+    assert ("nav", {"class": "switches", "aria-label": "Frequency axis"}) in Page(text).tags
     assert Fit.read(folder / "fit.json").to_json() == both.to_json()
     assert (folder / "figures" / "level_0_fit.png").stat().st_size > 10_000
     level = loadmat(folder / "fit.mat", squeeze_me=True)["fit"]["level"].item()

@@ -75,6 +75,34 @@ def test_without_reference_the_bias_is_warned_of(tmp_path):
     assert np.median(np.abs(bla.g / exact - 1.0)[inside]) < 0.1
 
 
+@pytest.mark.parametrize("noise", [1e-2, 1e-3, 1e-4])
+def test_without_reference_no_line_shows_the_inverse_of_the_controller(tmp_path, noise):
+    """Above 30 Hz nothing is played: there the torque is the controller's answer to noise."""
+    write(tmp_path / "rig" / "one", data(noise=noise), symbols="uy")
+    result = analyze(tmp_path / "rig")
+    f, left_out = result.levels[0].bla.frequency_hz, result.levels[0].left_out_hz
+    exact = rigs.truth(rigs.random_rig(3, linear=True), f)
+    assert np.abs(np.log(np.abs(result.levels[0].bla.g / exact))).max() < 0.1
+    assert 25.0 < f[-1] < 30.5 and left_out[-1] > 200.0
+    assert any("do not stand above noise" in note for note in result.notes)
+
+
+def test_without_reference_nothing_is_shown_as_one(tmp_path):
+    for level in (0, 1):
+        record = data(seed=level) * (1.0 + level)
+        write(tmp_path / "rig" / f"{level}", record, symbols="uy", level=level)
+    result = analyze(tmp_path / "rig")
+    out = write_result(result, tmp_path / "out")
+    shown = Page(out.read_text("utf-8")).data()
+    for level, plots in zip(result.levels, shown["levels"], strict=True):
+        assert np.isnan(level.excited.reference).all() and np.isnan(level.amplitude_rad).all()
+        axes = [a for name, a in plots["spectra"]["layout"].items() if name.startswith("yaxis")]
+        titles = [axis["title"]["text"] for axis in axes]
+        assert titles == ["torque (dB re 1 N m)", "position (dB re 1 rad)"]
+        assert {trace.get("yaxis", "y") for trace in plots["spectra"]["data"]} == {"y", "y2"}
+    assert not {"all-v", "all-power"} & set(shown["overview"])
+
+
 def test_a_sweep_is_said_not_to_stand_for_noise(tmp_path):
     write(tmp_path / "rig" / "one", data(kind="chirp"))
     assert any("not Gaussian (kurtosis 1.5" in note for note in analyze(tmp_path / "rig").notes)

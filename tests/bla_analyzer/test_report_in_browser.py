@@ -2,27 +2,18 @@
 
 from __future__ import annotations
 
-import json
-import shutil
-import subprocess
-from html.parser import HTMLParser
 from pathlib import Path
 
 import numpy as np
 import pytest
+from browser import chromium, found_in, needs_chromium
 from synthetic_result import make_result
 
 from bla_analyzer.report.report_page import render_report
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")
-OPTIONS = ("--headless", "--no-sandbox", "--disable-gpu", "--virtual-time-budget=10000")
+pytestmark = needs_chromium
 
-READER = """<script>
-addEventListener("load", async () => {
-  const find = (text) => document.querySelector(text), found = {};
-  const rest = () => new Promise((done) => setTimeout(done, 100));
-  const plots = [...document.querySelectorAll(".plot")];
+SCRIPT = """
   const axes = () => Object.fromEntries(plots.filter((p) => p.layout).map((p) => [p.id,
     {type: p.layout.xaxis.type ?? "linear", range: p._fullLayout.xaxis.range.slice(),
      title: p.layout.xaxis.title.text, points: p.data.at(-1).x.length}]));
@@ -45,23 +36,7 @@ addEventListener("load", async () => {
   await rest();
   found.widths = plots.filter((p) => p._fullLayout).map((p) => p._fullLayout.width);
   found.light = document.documentElement.classList.contains("light");
-  document.body.innerHTML = `<pre id="found"></pre>`;
-  find("#found").textContent = JSON.stringify(found);
-});
-</script></body>"""
-
-
-class Found(HTMLParser):
-    """Reads what the script has left in the page."""
-
-    text = ""
-    inside = False
-
-    def handle_starttag(self, tag, attrs):
-        self.inside = ("id", "found") in attrs
-
-    def handle_data(self, data):
-        self.text += data if self.inside else ""
+"""
 
 
 @pytest.fixture(scope="module")
@@ -71,20 +46,9 @@ def page(tmp_path_factory) -> Path:
     return file
 
 
-def chromium(*arguments: str) -> str:
-    done = subprocess.run(
-        [CHROMIUM, *OPTIONS, *arguments], capture_output=True, text=True, timeout=120, check=True
-    )
-    return done.stdout
-
-
 @pytest.fixture(scope="module")
 def found(page) -> dict:
-    probed = page.with_name("probed.html")
-    probed.write_text(page.read_text("utf-8").replace("</body>", READER), encoding="utf-8")
-    reader = Found()
-    reader.feed(chromium("--window-size=1000,900", "--dump-dom", probed.as_uri()))
-    return json.loads(reader.text)
+    return found_in(page, SCRIPT)
 
 
 LINKED = ("all-bla", "all-coherence", "all-sensitivity", "bla", "coherence", "sensitivity")

@@ -118,8 +118,27 @@ def test_the_command_says_what_a_plan_could_show(tmp_path: Path):
         (["bags", "--level", "0.01"], "--level describes a plan"),
         (["bags"], "Give --nominal"),
         (["--set", "simulator.delay.time_s=0.001"], "switches an effect on"),
+        (
+            ["--set", "simulator.j=1e-4"],
+            "the plan: /rig/simulator: fv / j is 4e+04 1/s, a motion too fast to be simulated at "
+            "1000 samples a second; check values and units of fv and j.",
+        ),
     ],
 )
 def test_a_plan_that_says_too_little_or_too_much(arguments, sentence):
     result = run_command(app, ["plan", *arguments])
     assert result.exit_code == 2 and sentence in " ".join(result.output.split())
+
+
+def test_ctrl_c_ends_a_foresight_at_once_and_leaves_an_earlier_plan(start_program, tmp_path: Path):
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "plan.json").write_text("earlier")
+    run = start_program("fjr_cli", "plan", "--level", "0.01", "--out", str(out), errors_apart=True)
+    run.wait_for_text("1/29 ")
+    assert run.interrupt() == 130
+    *counted, said = run.errors.splitlines()
+    assert said == "Interrupted: nothing was written." and run.output == ""
+    assert len(counted) < 10, "it went on with other effects"
+    assert (out / "plan.json").read_text() == "earlier"
+    assert [path.name for path in out.iterdir()] == ["plan.json"]

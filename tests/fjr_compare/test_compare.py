@@ -179,5 +179,7 @@ def test_a_campaign_beside_itself_has_not_changed(campaign_result, tmp_path):
     found = compare([campaign_result, campaign_result])
     assert not found.changed and len(found.pairs[0].levels) == 3
     assert found.pairs[0].other == f"{campaign_result} (2)"
-    page = text_of(write_comparison(found, tmp_path / "out").read_text(encoding="utf-8"))
-    assert "No change that can be told from chance" in page
+    page = Page(write_comparison(found, tmp_path / "out").read_text(encoding="utf-8"))
+    assert "No change that can be told from chance" in "".join(page.texts)
+    assert all(plot["linked"] for plot in page.data()["overview"].values())
+    assert ("nav", {"class": "switches", "aria-label": "Frequency axis"}) in page.tags

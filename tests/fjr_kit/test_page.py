@@ -7,7 +7,7 @@ import pytest
 from html_page import EVIL, Page
 
 from fjr_kit.page import Column, Mark, Row, narrow_form, number, render_page
-from fjr_kit.plots import trace
+from fjr_kit.plots import linked, trace
 
 COLUMNS = [Column("name"), Column("value", "dB", ".4g"), Column("")]
 TEMPLATE = """{% extends "page.html" %}
@@ -29,14 +29,17 @@ def shown(tmp_path, monkeypatch):
     (folder / "one.html").write_text(TEMPLATE)
     monkeypatch.syspath_prepend(tmp_path)
 
-    def render(rows: list[Row], columns=COLUMNS, text: str = "text") -> str:
+    def render(
+        rows: list[Row], columns=COLUMNS, text: str = "text", items=None, levels=({},)
+    ) -> str:
+        overview = {} if "one" in levels[0] else {"one": {"data": [], "layout": {"title": text}}}
         return render_page(
             "pages_of_a_test",
             "one.html",
             title=text,
-            plots={"overview": {"one": {"data": [], "layout": {"title": text}}}, "levels": [{}]},
+            plots={"overview": overview, "levels": list(levels)},
             provenance={text: text},
-            items=[text],
+            items=items or [text],
             columns=columns,
             rows=rows,
             caption=text,
@@ -53,6 +56,19 @@ def test_no_part_of_a_page_lets_a_text_become_code(shown):
     assert [tag for tag, _ in page.tags] == [tag for tag, _ in plain.tags]
     assert page.data()["overview"]["one"]["layout"]["title"] == EVIL
     assert page.texts.count(EVIL) == plain.texts.count("text") + 4 + 6
+
+
+def test_a_page_has_the_switches_of_the_frequency_axis_where_a_plot_is_over_frequency(shown):
+    f = np.array([1.0, 2.0])
+    over = {"one": linked([trace(f, f, "a", "--ink")], ["y"], [1.0], f)}
+    nowhere = {"one": {"data": [], "layout": {}}}
+    assert 'class="switches"' not in shown([]) and 'class="switches"' not in shown(
+        [], levels=[nowhere]
+    )
+    switches = [a for tag, a in Page(shown([], levels=[nowhere, over])).tags if tag == "button"]
+    assert [a.get("data-unit") or a.get("data-scale") for a in switches[:5]] == [
+        *("Hz", "rad/s", "log", "linear", None)
+    ]
 
 
 def test_each_cell_of_a_card_is_named(shown):

@@ -15,6 +15,8 @@ from fjr_kit.showing import BareRefit
 from fjr_records.noise import noise_levels
 from fjr_sim_node.plant import PLANT
 from gap_diagnosis import Foresight, foresee, investigate
+from gap_diagnosis.foresight.periodic_sight import PeriodicSight
+from gap_diagnosis.model.nominal import refuse_too_stiff
 from gap_diagnosis.model.simulated_rig import Simulator
 from gap_diagnosis.record_investigation import investigate_records
 from gap_diagnosis.which.fits import Fitter
@@ -103,6 +105,51 @@ def test_what_could_be_taken_for_what():
     assert told["delay"] == ["actuator_lag"] and "delay" in told["actuator_lag"]
     assert "gravity" in told["torque_bias"]
     assert told["transmission_damping"] == []
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ({"jm": 1e-4, "j": 1e-4}, "fv / j is 4e+04 1/s"),
+        ({"fvm": 2e4}, "check values and units of fvm and jm."),
+        ({"k0": 1.5e7}, "the root of k0 / jm is 8.66e+03 1/s"),
+        ({"k0": math.inf, "jm": 1e-5, "j": 1e-5}, "fvm / jm is 3e+05 1/s"),
+    ],
+)
+def test_a_nominal_that_moves_too_fast_for_the_samples_is_refused(values, words):
+    recorded = planned_record(planned(1e-4))
+    with pytest.raises(InputError, match="too fast to be simulated at 1000 samples") as refused:
+        foresee(recorded, {**NOMINAL, **values})
+    assert words in str(refused.value)
+
+
+def test_a_stiff_axis_whose_motion_samples_can_show_is_not_refused():
+    refuse_too_stiff({**NOMINAL, "k0": 1.5e6}, 1000.0, "sheet.yaml")
+    refuse_too_stiff({**NOMINAL, "k0": math.inf}, 100.0, "sheet.yaml")
+
+
+def test_nothing_that_takes_too_long_is_played(monkeypatch):
+    """A lag is the stiffer the shorter it is, and this record shows one of microseconds."""
+    played, errors = [], PeriodicSight.errors
+
+    def watched(sight, models):
+        played.extend((sight, model) for model in models)
+        return errors(sight, models)
+
+    monkeypatch.setattr(PeriodicSight, "errors", watched)
+    long = planned_record(planned(1e-6, transient_periods=8, amplitudes_rad=(2e-2,)))
+    (one,) = foresee(long, NOMINAL, effects=["actuator_lag"]).effects
+    assert not any(sight.too_stiff(model) for sight, model in played)
+    assert sum(bool(model.effects) for _, model in played) > 3
+    sight, bare = played[0]
+    shorter = bare.with_effects({"actuator_lag.time_constant_s": 0.8 * one.limit})
+    assert sight.too_stiff(shorter), "the shortest lag that can be played shows"
+
+
+def test_an_effect_that_cannot_be_played_beside_a_nominal_has_a_reason(monkeypatch):
+    monkeypatch.setattr(PeriodicSight, "too_stiff", lambda _, model: bool(model.effects))
+    (one,) = foresee(planned_record(planned(1e-4)), NOMINAL, effects=["delay"]).effects
+    assert one.limit is None and "moves too fast to be simulated" in one.why_not
 
 
 def test_an_effect_that_is_none_is_refused():

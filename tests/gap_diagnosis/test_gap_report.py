@@ -119,6 +119,13 @@ def test_every_plot_has_its_place_and_every_place_a_plot(page):
     assert len(plots["levels"]) == 2
 
 
+def test_one_frequency_axis_serves_all_plots_over_frequency(page):
+    plots = page.data()["overview"] | page.data()["levels"][0]
+    over_frequency = {"where-position", "where-torque", "bla", "distortion", "sigma"}
+    assert {name for name, plot in plots.items() if plot.get("linked")} == over_frequency
+    assert ("nav", {"class": "switches", "aria-label": "Frequency axis"}) in page.tags
+
+
 def test_verdict_doubt_notes_sets_and_next_experiment_are_said(page, found):
     text = " ".join(" ".join(page.texts).split())
     assert "backlash or piecewise stiffness" in text and "confidence 90%" in text
