@@ -115,7 +115,7 @@ def tested_causes(
         found.append(
             Tested(
                 effect,
-                gain(fitter, fit, without),
+                gain(fitter, fit, without, fitter.acted(fit, effect)),
                 without,
                 invariance(fitter, fit, effect),
                 beyond_zero(effect, estimates) and not at_its_bound(fit, effect),

@@ -27,10 +27,13 @@ from .search_space import Space, space_for, starts
 
 _REFIT_ROUNDS = (8, 5, 5)
 _ADDED_ROUNDS = (6, 4)
-_NO_PROMISE = 0.998  # of the parent's cost: a start that gains less is not pursued
+_LEAST_PROMISE = 20.0  # a start that gains less than this (twice the nats) is not pursued
 _STARTS = 2
 RIPPLES_TRIED = 3
-_RIVAL = 1.05  # a second start that costs more than this times the first is not pursued
+_RIVAL = 0.05  # an error: a second start that costs so much more than the first is not pursued
+_ACTS = (
+    0.1  # of what is left in a band of a part: an effect that moves it by less does not act there
+)
 
 
 @dataclass(frozen=True)
@@ -45,6 +48,8 @@ class CellFit:
         variance: (cells,), of an error in each cell, rad2.
         left: (parts, bands), mean square of what is left on each part that selects, noise and the
             simulation's own error added, rad2.
+        acts: (parts,), whether the effect that was added last moves a part that selects; None
+            where that was not looked at.
     """
 
     effects: tuple[str, ...]
@@ -53,6 +58,7 @@ class CellFit:
     solution: Solution
     variance: np.ndarray
     left: np.ndarray
+    acts: np.ndarray | None = None
 
 
 class CellFitter:
@@ -114,6 +120,7 @@ class CellFitter:
             starts(effect, self.scales, cycles, self.nominal),
             partial(self._space, parent),
             partial(self._residuals, parent.variance),
+            partial(self._costs, parent.variance),
         )
 
     def promise(self, screened: Screening, before: CellFit, parent: CellFit) -> float:
@@ -125,16 +132,17 @@ class CellFitter:
             parent: the fit beside which it may be added.
         """
         ratio = np.sqrt(before.variance / parent.variance)[self._cell]
-        return screened.gain_beside(parent.solution, ratio)
+        costs = partial(self._costs, parent.variance)
+        return screened.gain_beside(parent.solution, ratio, costs)
 
     def add(self, parent: CellFit, effect: str, proposals: Sequence[Proposal]) -> CellFit | None:
         """Fit a parent's explanation with one effect more; None if no start promises anything."""
         best: CellFit | None = None
         kept: list[Space] = []
+        begun = float(self._costs(parent.variance, parent.solution.residuals[None])[0])
+        rival = proposals[0][0] + _RIVAL * self._cell.size if proposals else begun
         for cost, space, point in proposals:
-            if cost > _NO_PROMISE * parent.solution.cost or len(kept) == _STARTS:
-                break
-            if cost > _RIVAL * proposals[0][0]:
+            if cost > min(begun - _LEAST_PROMISE, rival) or len(kept) == _STARTS:
                 break
             if any(space is one for one in kept):
                 continue
@@ -145,7 +153,22 @@ class CellFitter:
             )
             if best is None or self.gains(fit, best).sum() > 0.0:
                 best = fit
-        return best
+        return None if best is None else replace(best, acts=self.acted(best, effect))
+
+    def acted(self, fit: CellFit, effect: str) -> np.ndarray:
+        """Return whether an effect moves each part that selects, beside what the fit leaves there.
+
+        A saturation does nothing where it is not reached; what such a part gains or loses says
+        something of the parameters beside it, and of friction that scatters from run to run.
+
+        Returns:
+            bool (parts,).
+        """
+        rest = {n: v for n, v in fit.model.effects.items() if not n.startswith(f"{effect}.")}
+        models = [fit.model, Model(fit.model.plant, rest)]
+        errors = self.evidence.errors(models, self.select_parts)
+        moved = self._mean_squares(errors[1] - errors[0])
+        return np.any(moved >= _ACTS * fit.left, axis=1)
 
     def without(self, fit: CellFit, effect: str) -> CellFit:
         """Return a fit with one effect taken out and all else fitted anew.
@@ -199,10 +222,12 @@ class CellFitter:
     def _left(self, model: Model) -> np.ndarray:
         parts = self.select_parts
         errors = self.evidence.errors([model], parts)[0]
-        bins = self._select_bins
-        squares = np.bincount(bins, errors**2, len(parts) * self.evidence.bands)
-        mean = squares.reshape(len(parts), -1) / self._counts
-        return mean + self._select_floor
+        return self._mean_squares(errors) + self._select_floor
+
+    def _mean_squares(self, values: np.ndarray) -> np.ndarray:
+        """Return the mean square of numbers on the parts that select, (parts, bands)."""
+        squares = np.bincount(self._select_bins, values**2, self._counts.size)
+        return squares.reshape(self._counts.shape) / self._counts
 
     def _ripples(self, parent: CellFit) -> RecordRipples:
         if self._rippled is None or self._rippled[0] is not parent:
@@ -222,6 +247,25 @@ class CellFitter:
 
     def _residuals(self, variance: np.ndarray, models: Sequence[Model]) -> np.ndarray:
         return self.evidence.errors(models, self.fit_parts) / np.sqrt(variance[self._cell])
+
+    def _costs(self, variance: np.ndarray, errors: np.ndarray) -> np.ndarray:
+        """Return twice the negative log-likelihood of errors whose variances by cell are unknown.
+
+        Zero for the fit whose variances are given, but where noise alone is left. An offset is one
+        line of many: a sum of squares in these variances would hardly see that it is gone.
+
+        Args:
+            variance: (cells,), rad2.
+            errors: (models, errors), in its standard deviations.
+
+        Returns:
+            (models,).
+        """
+        cells, least = self.evidence.cells, self._floor / variance
+        count = np.bincount(self._cell, minlength=cells)
+        squares = np.array([np.bincount(self._cell, row**2, cells) for row in errors])
+        mean = np.maximum(squares / np.maximum(count, 1), least)
+        return np.log(mean) @ count
 
     def _variance(self, errors: np.ndarray) -> np.ndarray:
         found = self.evidence.mean_squares(errors, self.fit_parts)

@@ -27,8 +27,15 @@ _GREATEST = 1e15  # change of an error: a motion that diverges changes some by m
 _FOLLOW = 0.1  # how far a parameter of the parent may follow, relative
 
 Errors = Callable[[Sequence[Model]], np.ndarray]
+Costs = Callable[[np.ndarray], np.ndarray]
+"""Takes errors, (models, errors) in standard deviations; returns what each costs, (models,)."""
 Proposal = tuple[float, Space, np.ndarray]
 """A starting point: what it costs, the space it lies in, the point."""
+
+
+def sums_of_squares(errors: np.ndarray) -> np.ndarray:
+    """Return what errors of known variance cost."""
+    return np.einsum("ij,ij->i", errors, errors)
 
 
 @dataclass(frozen=True)
@@ -51,6 +58,7 @@ class Screening:
         seeds: Sequence[Mapping[str, float]],
         space_of: Callable[[Mapping[str, float]], Space],
         errors: Errors,
+        costs: Costs = sums_of_squares,
     ) -> None:
         """Evaluate all seeds once.
 
@@ -60,28 +68,30 @@ class Screening:
             seeds: starting values of the effect's parameters by full name.
             space_of: the space in which a seed is fitted.
             errors: error vectors of models, as the parent's residuals.
+            costs: what error vectors cost.
         """
         self._seeds = seeds
         changes = errors([beside(model, seed) for seed in seeds]) - parent.residuals
         inverse = np.linalg.pinv(parent.jacobian, rcond=1e-6)
-        self._candidates = _candidates(parent, seeds, changes, inverse)
+        self._candidates = _candidates(parent, seeds, changes, inverse, costs)
         self._changes = np.clip(changes, -_GREATEST, _GREATEST).astype(np.float32)
-        self._tries = _Tries(parent, model, inverse, space_of, errors)
+        self._tries = _Tries(parent, model, inverse, space_of, errors, costs)
 
     @property
     def gain(self) -> float:
         """By how much the best seed would lower the parent's cost, predicted linearly."""
         return self._candidates[0].gain
 
-    def gain_beside(self, other: Solution, ratio: np.ndarray) -> float:
+    def gain_beside(self, other: Solution, ratio: np.ndarray, costs: Costs) -> float:
         """Return what `gain` would be beside another fit, if the seeds changed the motion alike.
 
         Args:
             other: where the other fit ended.
             ratio: (errors,), standard deviations of the parent's errors over those of the other's.
+            costs: what error vectors of the other fit cost.
         """
         inverse = np.linalg.pinv(other.jacobian, rcond=1e-6)
-        return _candidates(other, self._seeds, self._changes * ratio, inverse)[0].gain
+        return _candidates(other, self._seeds, self._changes * ratio, inverse, costs)[0].gain
 
     def proposals(self) -> list[Proposal]:
         """Return starting points, tried at several sizes, the most promising first.
@@ -107,9 +117,10 @@ class _Tries:
         inverse: np.ndarray,
         space_of: Callable[[Mapping[str, float]], Space],
         errors: Errors,
+        costs: Costs,
     ) -> None:
         self._parent, self._model, self._inverse = parent, model, inverse
-        self._space_of, self._errors = space_of, errors
+        self._space_of, self._errors, self._costs = space_of, errors, costs
         self._spaces: dict[int, Space] = {}
         self._found: list[tuple[float, _Candidate, np.ndarray]] = []
 
@@ -122,7 +133,7 @@ class _Tries:
         trials = self._errors(
             [self._space(c).model(p) for (c, _), p in zip(tries, points, strict=True)]
         )
-        costs = np.einsum("ij,ij->i", trials, trials)
+        costs = self._costs(trials)
         for (candidate, _), point, cost in zip(tries, points, costs, strict=True):
             self._found.append((float(cost), candidate, point))
         self._found.sort(key=lambda one: one[0])
@@ -157,6 +168,7 @@ def _candidates(
     seeds: Sequence[Mapping[str, float]],
     changes: np.ndarray,
     inverse: np.ndarray,
+    costs: Costs,
 ) -> list[_Candidate]:
     """Return one candidate for each seed, or for each pair of seeds a quarter turn apart.
 
@@ -165,6 +177,7 @@ def _candidates(
         seeds: starting values.
         changes: (seeds, errors), what each changes.
         inverse: of the parent's Jacobian.
+        costs: what error vectors cost.
 
     Returns:
         The candidates, descending in gain.
@@ -173,13 +186,15 @@ def _candidates(
     found = []
     for members in by_shape(seeds).values():
         weights, *_ = np.linalg.lstsq(own[members].T, -parent.residuals, rcond=1e-9)
-        gain = -float(weights @ (own[members] @ parent.residuals))
+        if len(members) == 1 and not any(map(_scales, seeds[members[0]])):
+            weights = np.ones(1)
+        before, after = costs(
+            np.array([parent.residuals, parent.residuals + weights @ own[members]])
+        )
+        gain = float(before - after)
         if len(members) == 1:
             seed, size = seeds[members[0]], float(weights[0])
-            if not any(map(_scales, seed)):
-                after = parent.residuals + own[members[0]]
-                size, gain = 1.0, parent.cost - float(after @ after)
-            elif size < 0.0 and not _may_be_negative(seed):
+            if size < 0.0 and not _may_be_negative(seed):
                 size, gain = 1.0, 0.0
             found.append(_Candidate(seed, changes[members[0]], size, gain))
             continue

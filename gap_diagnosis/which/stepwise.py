@@ -64,13 +64,24 @@ class Gain:
         return min(self.mean, 3.0 * self.without_best) > LEAST_GAIN and repeats
 
 
-def gain(fitter: CellFitter, after: CellFit, before: CellFit) -> Gain:
-    """Return what `after` gains over `before` on the parts that select."""
+def gain(
+    fitter: CellFitter, after: CellFit, before: CellFit, acts: np.ndarray | None = None
+) -> Gain:
+    """Return what `after` gains over `before` on the parts that select.
+
+    Args:
+        fitter: that made both.
+        after: the fit that may be better.
+        before: the other one.
+        acts: bool (parts,), where it must repeat; None for all parts in which anything changes.
+    """
     difference = fitter.gains(after, before)
-    if difference.size < 2 or not difference.any():
+    telling = difference[np.abs(difference) >= _NEUTRAL * np.abs(difference).max()]
+    if acts is not None:
+        telling = difference[acts]
+    if difference.size < 2 or not telling.any():
         return Gain(float(difference.mean()), 0.0, 0.0, 1.0)
     most = int(np.argmax(difference))
-    telling = difference[np.abs(difference) >= _NEUTRAL * np.abs(difference).max()]
     ranks = stats.rankdata(np.abs(telling))
     return Gain(
         float(difference.mean()),
@@ -199,7 +210,7 @@ class Stepwise:
 
         Of those that unseen parts cannot tell from it, the one with the fewest parameters.
         """
-        gains = [self._gain(fit, parent) for fit in fits]
+        gains = [gain(self._fitter, fit, parent, fit.acts) for fit in fits]
         repeating = [
             fit
             for fit, found in zip(fits, gains, strict=True)
