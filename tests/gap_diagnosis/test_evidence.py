@@ -149,6 +149,34 @@ def test_intervals_of_few_runs_allow_for_friction_that_scatters():
     assert held["torque_bias.torque_nm"] >= 7, held
 
 
+def test_an_effect_must_repeat_only_where_it_acts():
+    limit = {"torque_saturation.limit_nm": 160.0}  # the lower level asks for 80 N m
+    fitter = CellFitter(Evidence(records(limit, runs=3, scatter=0.05), NOMINAL), NOMINAL, 0.1)
+    refit = fitter.refit()
+    proposals = fitter.screening(refit, "torque_saturation").proposals()
+    fit = fitter.add(refit, "torque_saturation", proposals)
+    levels = np.array([fitter.evidence.parts[part].level for part in fitter.select_parts])
+    assert not fit.acts[levels == 0].any() and fit.acts[levels == 1].all()
+    where_it_acts = gain(fitter, fit, refit, fit.acts)
+    assert where_it_acts.present and where_it_acts.p == 0.5 ** np.sum(levels == 1)
+
+
+@pytest.mark.parametrize("bias", [0.05, 0.1])
+def test_an_offset_promises_more_than_one_line_of_many(bias):
+    sized = {"torque_bias.torque_nm": bias}
+    evidence = Evidence(records(sized, runs=3, seconds=16.0, scatter=0.02), NOMINAL)
+    fitter = CellFitter(evidence, NOMINAL, 0.1)
+    refit = fitter.refit()
+    screening = fitter.screening(refit, "torque_bias")
+    cost, space, point = screening.proposals()[0]
+    errors = evidence.errors([space.model(point)], fitter.fit_parts)[0]
+    one_line = refit.solution.cost / evidence.lines  # all that a sum of squares could gain
+    assert screening.gain > 3.0 * one_line and -cost > 3.0 * one_line
+    fit = fitter.add(refit, "torque_bias", [(cost, space, point)])
+    assert np.mean(errors**2) < np.mean(evidence.errors([refit.model], fitter.fit_parts) ** 2)
+    assert fit.model.effects["torque_bias.torque_nm"] == pytest.approx(bias, rel=0.02)
+
+
 def test_a_cause_without_which_nothing_of_the_gap_comes_back_is_not_present():
     fitter, refit, fit = biased()
     (tested,) = record_judgement.tested_causes(fitter, fit, refit, SCATTER)
