@@ -198,7 +198,8 @@ def _kept(
 ) -> tuple[Found, list[Tested]]:
     """Take out, one at a time, the causes that do not pass the tests beside the others.
 
-    Where too little is held out, no cause is kept.
+    A cause whose size alone is not certain may be blurred by another one: then that goes which
+    gains least of all. Where too little is held out, no cause is kept.
     """
     if len(fitter.evidence.parts_for("select")) < FEWEST_PARTS:
         return replace(found, steps=found.steps[:1]), []
@@ -209,7 +210,8 @@ def _kept(
         failed = [t for t in tested if not t.passed]
         if not failed:
             break
-        weakest = min(failed, key=lambda t: t.gain.mean)
+        blurred = any(t.passes_beside_size for t in failed)
+        weakest = min(tested if blurred else failed, key=lambda t: t.gain.mean)
         before = [fit for fit in steps if weakest.effect not in fit.effects]
         last = weakest.without
         steps = before if last.effects == before[-1].effects else [*before, last]

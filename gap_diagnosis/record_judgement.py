@@ -41,6 +41,7 @@ FEWEST_PARTS = 6
 
 LEAST_PRESENT = 0.5
 """A cause that is there less often than not is not called present."""
+_UNCERTAIN = 0.5  # of what a cause whose size is not certain would be present
 _DOUBTED = 0.7  # over what remains: a cause that closes such a share is there as often as not
 
 THIN = (
@@ -74,23 +75,29 @@ class Tested:
     @property
     def passed(self) -> bool:
         """Whether the cause is called present."""
+        return self.certain and self.passes_beside_size
+
+    @property
+    def passes_beside_size(self) -> bool:
+        """Whether it passes all tests but that of its own size, which another cause may blur."""
         same = self.invariance_p is None or self.invariance_p >= LEAST_INVARIANCE_P
         closes = self.share.low is None or not self.share.low <= 0.0  # NaN: one part says nothing
-        tests = self.gain.present and self.certain and same and closes
-        return tests and self.present >= LEAST_PRESENT
+        least = LEAST_PRESENT if self.certain else _UNCERTAIN * LEAST_PRESENT
+        return self.gain.present and same and closes and self.present >= least
 
     @property
     def present(self) -> float:
         """Probability that it is there.
 
-        A cause that closes little even in the band where it gains most may be a part of what no
-        effect explains.
+        A cause that closes little of the gap, and little even in the band where it gains most, may
+        be a part of what no effect explains.
         """
         sure = (1.0 - min(1.0, 5.0 * self.gain.p)) * min(1.0, self.gain.share + 0.1)
-        closed = max(self.in_band, 0.0)
+        of_all = self.share.low if self.share.low is not None and self.share.low > 0.0 else 0.0
+        closed = max(self.in_band, of_all, 0.0)
         sure *= closed / (closed + _DOUBTED * (1.0 - closed))
         if not self.certain:
-            sure *= 0.5
+            sure *= _UNCERTAIN
         if self.invariance_p is not None and self.invariance_p < LEAST_INVARIANCE_P:
             sure *= 0.5
         return min(sure, 0.99)

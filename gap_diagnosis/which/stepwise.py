@@ -19,7 +19,7 @@ from .cell_fits import CellFit, CellFitter
 from .screening import Screening
 
 MOST_CAUSES = 4
-_PROPOSED, _FITTED = 6, 4
+_PROPOSED, _FITTED = 7, 5
 _AGAIN = 8  # effects without ripple that are screened beside a cause
 NOTHING_LEFT = 2.0
 """Mean squared error over noise below which noise explains what is left."""

@@ -180,11 +180,15 @@ def test_an_offset_promises_more_than_one_line_of_many(bias):
 def test_a_cause_without_which_nothing_of_the_gap_comes_back_is_not_present():
     fitter, refit, fit = biased()
     (tested,) = record_judgement.tested_causes(fitter, fit, refit, SCATTER)
-    closes_little = replace(tested, in_band=0.01)
+    little = Figure(value=0.01, low=0.005, high=0.015)
+    closes_little = replace(tested, in_band=0.01, share=little)
+    assert replace(tested, in_band=0.01).passed  # it closes the gap as a whole
     assert tested.passed and closes_little.present < 0.1 and not closes_little.passed
     assert 0.5 < tested.share.low < tested.share.high < 1.05
     tested = replace(tested, gain=Gain(mean=10.0, without_best=8.0, share=1.0, p=0.002))
     assert tested.passed
+    blurred = replace(tested, certain=False)
+    assert blurred.passes_beside_size and not blurred.passed
     closes_nothing = Figure(value=-0.02, low=-0.03, high=-0.01)
     assert not replace(tested, share=closes_nothing).passed
     assert not replace(tested, share=Figure(value=0.01, low=-0.01, high=0.03)).passed
