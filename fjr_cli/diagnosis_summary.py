@@ -21,6 +21,7 @@ from gap_diagnosis.outcome.diagnosis import Diagnosis
 from gap_diagnosis.outcome.verdict_words import (
     HELD_OUT,
     WORDS,
+    action,
     closed,
     explanation,
     headline,
@@ -35,10 +36,9 @@ RANKED = 5
 
 def print_summary(diagnosis: Diagnosis, console: Console, out: Path) -> None:
     """Print verdict, what it means, effects with parameters, gap and what a reader must see."""
-    words = WORDS[diagnosis.verdict]
     sure = f"(verdict: {diagnosis.verdict}, confidence {diagnosis.confidence:.0%})"
     _say(console, f"{headline(diagnosis)} {sure}")
-    _say(console, f"{meaning(diagnosis)} {words.action}")
+    _say(console, f"{meaning(diagnosis)} {action(diagnosis)}")
     for sentence in summaries(diagnosis):
         _say(console, sentence)
     if diagnosis.causes:
@@ -59,7 +59,7 @@ def print_summary(diagnosis: Diagnosis, console: Console, out: Path) -> None:
         _say(console, f"Next experiment: {diagnosis.next_experiment.description}")
     for note in diagnosis.notes:
         _say(console, f"Note: {note}")
-    _say(console, f"When not to believe it: {words.doubt}")
+    _say(console, f"When not to believe it: {WORDS[diagnosis.verdict].doubt}")
     if diagnosis.parameters:
         _say(console, f"Better simulation: fjr simulate --rig {shlex.quote(str(out))}/updated.yaml")
 

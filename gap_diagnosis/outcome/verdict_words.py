@@ -17,6 +17,10 @@ _CUT = (
     "A gap remains after the refit, and the time budget ended the search for its cause. That is "
     "no proof that no effect of the catalogue explains it: give a greater --budget, or --effects."
 )
+_NO_EXPERIMENT = (
+    "No experiment was found that would tell them apart within the recorded torques; updated.yaml "
+    "holds the first."
+)
 
 
 @dataclass(frozen=True)
@@ -120,6 +124,13 @@ def meaning(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict == "unexplained" and OUT_OF_TIME in diagnosis.notes:
         return _CUT
     return WORDS[diagnosis.verdict].meaning.format(on=ON[diagnosis.reported_on])
+
+
+def action(diagnosis: Diagnosis) -> str:
+    """Return what to do next."""
+    if diagnosis.verdict == "ambiguous" and diagnosis.next_experiment is None:
+        return _NO_EXPERIMENT
+    return WORDS[diagnosis.verdict].action
 
 
 def closed(diagnosis: Diagnosis) -> str:

@@ -9,7 +9,7 @@ from typing import Any
 from ..model.simulated_rig import Model
 from ..outcome.cause_words import evidence_sentences, remainder_sentences
 from ..outcome.diagnosis import Diagnosis
-from ..outcome.verdict_words import HELD_OUT, WORDS, closed, headline, meaning, summaries
+from ..outcome.verdict_words import HELD_OUT, WORDS, action, closed, headline, meaning, summaries
 from .gap_tables import causes
 from .waterfall import height, waterfall_plot
 
@@ -22,7 +22,8 @@ def outcome_values(diagnosis: Diagnosis) -> dict[str, Any]:
         "headline": headline(diagnosis),
         "meaning": meaning(diagnosis),
         "closed": closed(diagnosis),
-        "words": WORDS[diagnosis.verdict],
+        "action": action(diagnosis),
+        "doubt": WORDS[diagnosis.verdict].doubt,
         "summaries": summaries(diagnosis),
         "data": HELD_OUT[diagnosis.reported_on],
         "waterfall_px": height(diagnosis) if waterfall_plot(diagnosis) else 0,

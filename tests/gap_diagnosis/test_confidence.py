@@ -7,8 +7,15 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from gap_diagnosis.outcome.diagnosis import Candidate, Diagnosis, EvidenceKind, Gap, Gaps
-from gap_diagnosis.outcome.verdict_words import ON, OUT_OF_TIME, meaning
+from gap_diagnosis.outcome.diagnosis import (
+    Candidate,
+    Diagnosis,
+    EvidenceKind,
+    Gap,
+    Gaps,
+    NextExperiment,
+)
+from gap_diagnosis.outcome.verdict_words import ON, OUT_OF_TIME, action, meaning
 from gap_diagnosis.which.confidence import (
     COEFFICIENTS,
     NAMES,
@@ -88,3 +95,14 @@ def test_a_search_that_the_budget_ended_is_no_proof_that_nothing_explains_the_ga
     cut = unexplained.model_copy(update={"notes": [*unexplained.notes, OUT_OF_TIME]})
     assert "no explanation of the catalogue closes it" in meaning(unexplained)
     assert "--budget" in meaning(cut) and "closes it" not in meaning(cut)
+
+
+def test_nobody_is_sent_to_an_experiment_that_is_not_named():
+    (ambiguous,) = [d for d in VERDICTS if d.verdict == "ambiguous"][:1]
+    planned = NextExperiment(
+        kind="level", description="Twice the level.", separates=["backlash", "gravity"],
+        predicted_sigma=5.0, rig_time_s=60.0, settings={},
+    )  # fmt: skip
+    named = ambiguous.model_copy(update={"next_experiment": planned})
+    assert ambiguous.next_experiment is None and "Run the next experiment" in action(named)
+    assert "No experiment was found" in action(ambiguous) and "Run the" not in action(ambiguous)
