@@ -184,8 +184,8 @@ def _waits_for(recorder: HandRecorder) -> str:
         return "Waiting for the description of a realization on /rig/experiment."
     if recorder.samples:
         return f"Sample {recorder.samples + 1} does not come; `fjr status` says who is missing."
-    again = "; `fjr reset` plays the realization from its beginning" * recorder.late
-    return f"Waiting for the first sample{again}."
+    begun = "" if recorder.late else "if the realization has begun, "
+    return f"Waiting for the first sample; {begun}`fjr reset` plays it from its beginning."
 
 
 def _refuse_trip(recorder: HandRecorder) -> None:

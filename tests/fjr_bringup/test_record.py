@@ -63,7 +63,7 @@ def test_ctrl_c_keeps_whole_periods_and_a_late_recorder_waits(start, domain: int
 
     fjr(start, "speed", "0.2")
     late = start("fjr_cli", "record", "--out", str(tmp_path / "late"))
-    late.wait_for_text("`fjr reset` plays the realization from its beginning")
+    late.wait_for_text("`fjr reset` plays it from its beginning")
     fjr(start, "speed", "max")
     fjr(start, "reset")
     assert late.exit_status() == 0, late.output
