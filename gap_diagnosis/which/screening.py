@@ -23,7 +23,6 @@ from .search_space import Space, beside
 _SIZES = (0.1, 0.3, 3.0)  # of the size that the linear prediction asks for, tried after that
 _TRIED = 6
 _SCALED = 2
-_GREATEST = 1e15  # change of an error: a motion that diverges changes some by more
 _FOLLOW = 0.1  # how far a parameter of the parent may follow, relative
 
 Errors = Callable[[Sequence[Model]], np.ndarray]
@@ -70,11 +69,10 @@ class Screening:
             errors: error vectors of models, as the parent's residuals.
             costs: what error vectors cost.
         """
-        self._seeds = seeds
         changes = errors([beside(model, seed) for seed in seeds]) - parent.residuals
         inverse = np.linalg.pinv(parent.jacobian, rcond=1e-6)
         self._candidates = _candidates(parent, seeds, changes, inverse, costs)
-        self._changes = np.clip(changes, -_GREATEST, _GREATEST).astype(np.float32)
+        self._seeds, self._changes = seeds, changes
         self._tries = _Tries(parent, model, inverse, space_of, errors, costs)
 
     @property
