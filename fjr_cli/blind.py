@@ -87,20 +87,34 @@ def run(
 @blind.command()
 @reports_errors(kept="the answers are as they were")
 def score(
-    out: Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder of a check.")],
+    folders: Annotated[
+        list[Path],
+        typer.Argument(metavar="FOLDER...", help="Folder of a check, or several of one report."),
+    ],
     unfinished: Annotated[
         bool,
         typer.Option(help="End a check here whose cases have not all got their verdicts."),
     ] = False,
+    out: Annotated[
+        Path,
+        typer.Option(metavar="FOLDER", help="Where the report of several checks goes."),
+    ] = Path("blind_report"),
 ) -> None:
-    """Unseal and score a check whose verdicts are all there, or write its report again."""
+    """Unseal and score a check whose verdicts are all there, or write its report again.
+
+    Of several folders, whose checks have been scored, one report is made.
+    """
     from fjr_kit.installed import require_report_extra
 
     require_report_extra()
     from fjr_kit.folder_lock import locked_folder
     from fjr_validation.blind.check import BlindCheck
-    from fjr_validation.blind.report import score_check
+    from fjr_validation.blind.report import score_check, score_together
 
-    check = BlindCheck.open(out)
-    with locked_folder(out):
-        typer.echo(score_check(check, unfinished=unfinished))
+    checks = [BlindCheck.open(folder) for folder in folders]
+    if len(checks) > 1:
+        with locked_folder(out):
+            typer.echo(score_together(checks, out))
+        return
+    with locked_folder(folders[0]):
+        typer.echo(score_check(checks[0], unfinished=unfinished))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -12,7 +13,7 @@ from fjr_kit.atomic import write_whole
 from fjr_kit.errors import InputError
 
 from .answers import WORLDS, Answer, World
-from .check import BlindCheck, Unsealed
+from .check import BlindCheck, Manifest, Unsealed
 from .figures import draw_all
 from .frozen import frozen_digest
 from .outcome import CLEAR, CONFIDENT, Outcome
@@ -51,17 +52,81 @@ _MEANT = (
 )
 
 
+@dataclass(frozen=True)
+class _Source:
+    """A check whose verdicts a report is made of.
+
+    Attributes:
+        seed: of its cases, or what stands for it.
+        manifest: what it is.
+        planned: number of its cases.
+        seen: how many of them have verdicts.
+    """
+
+    seed: str
+    manifest: Manifest
+    planned: int
+    seen: int
+
+
 def score_check(check: BlindCheck, *, unfinished: bool = False) -> Path:
     """Unseal the answers if that is still to be done; write scores and report; return the report.
 
     Raises:
         InputError: verdicts are missing, or something was changed.
     """
+    source, lines, outcomes = _scored(check, unfinished=unfinished)
+    return _write([source], lines, outcomes, _report_folder(check))
+
+
+def score_together(checks: Sequence[BlindCheck], folder: Path) -> Path:
+    """Write one report of several checks, whose answers are unsealed; return it.
+
+    A thousand cases take longer than one machine may have: each check has its own seed, key and
+    version, and the report names them all.
+
+    Args:
+        checks: of the same methods.
+        folder: where the report goes.
+
+    Raises:
+        InputError: a check is still sealed, two are the same or have other methods, or something
+            was changed.
+    """
+    methods = checks[0].manifest.methods
+    if len({check.manifest.check for check in checks}) < len(checks):
+        raise InputError("The folders hold the same check twice; name each check once.")
+    for check in checks:
+        if not check.unsealed:
+            raise InputError(
+                f"{check.folder} is still sealed; end it first with "
+                f"`fjr blind score {check.folder}`."
+            )
+        if check.manifest.methods != methods:
+            raise InputError(
+                f"{check.folder} compares {', '.join(check.manifest.methods)}, and "
+                f"{checks[0].folder} {', '.join(methods)}; score together what compares the same."
+            )
+    sources, lines, outcomes = [], [], []
+    for check in checks:
+        source, own, found = _scored(check)
+        sources.append(source)
+        lines += [{**line, "case": f"{source.seed} {line['case']}"} for line in own]
+        outcomes += [replace(one, case=f"{source.seed} {one.case}") for one in found]
+    folder.mkdir(parents=True, exist_ok=True)
+    return _write(sources, lines, outcomes, folder)
+
+
+def _scored(
+    check: BlindCheck, *, unfinished: bool = False
+) -> tuple[_Source, list[dict[str, Any]], list[Outcome]]:
+    """Return where the outcomes of a check come from, its raw verdicts and these outcomes."""
     answers = dict(check.unseal(unfinished=unfinished))
     lines = [line for line in check.verdicts() if line["case"] in answers]
     outcomes = [Outcome.of(answers[line["case"]], line) for line in lines]
     opened = Unsealed.read(check.folder / "unsealed.json")
-    return _write(check, lines, outcomes, f"seed {opened.seed}", _report_folder(check))
+    seen = len({line["case"] for line in lines})
+    return _Source(str(opened.seed), check.manifest, len(check.cases), seen), lines, outcomes
 
 
 def rehearse_report(check: BlindCheck) -> None:
@@ -92,7 +157,8 @@ def rehearse_report(check: BlindCheck) -> None:
     folder = _report_folder(check)
     try:
         with TemporaryDirectory(prefix=".rehearsal-", dir=folder) as place:
-            _write(check, [], outcomes, "a rehearsal", Path(place))
+            source = _Source("a rehearsal", check.manifest, len(check.cases), len(check.cases))
+            _write([source], [], outcomes, Path(place))
     except OSError as error:
         raise InputError(
             f"{folder}, where the report will go, cannot be written: {error.strerror}; make room "
@@ -113,44 +179,38 @@ def _report_folder(check: BlindCheck) -> Path:
 
 
 def _write(
-    check: BlindCheck,
+    sources: Sequence[_Source],
     lines: Sequence[Mapping[str, Any]],
     outcomes: Sequence[Outcome],
-    origin: str,
     folder: Path,
 ) -> Path:
     """Write scores, figures and text into a folder; return the text's path."""
-    methods = check.manifest.methods
+    methods = sources[0].manifest.methods
     found = all_scores(outcomes, methods, frozen_digest())
     write_whole(folder / "scores.json", found.to_json())
     ours = [o for o in outcomes if o.method == methods[0]]
     draw_all(ours, folder)
     report = folder / "report.md"
-    text = _text(check, found, outcomes, ours, origin, side_by_side(lines, outcomes, methods))
+    text = _text(sources, found, outcomes, ours, side_by_side(lines, outcomes, methods))
     write_whole(report, "\n".join(text) + "\n")
     return report
 
 
 def _text(
-    check: BlindCheck,
+    sources: Sequence[_Source],
     found: Scores,
     outcomes: Sequence[Outcome],
     ours: Sequence[Outcome],
-    origin: str,
     beside: Sequence[str],
 ) -> list[str]:
-    manifest = check.manifest
-    planned, seen = len(check.cases), len(ours)
-    changed = "" if found.frozen == manifest.frozen else (
-        f" **The sources that score are others now: {found.frozen[:16]}.**"
-    )  # fmt: skip
-    ended = "" if seen == planned else f" The check was ended after {seen} of {planned} cases."
+    many = "" if len(sources) == 1 else f" of {len(sources)} checks"
     return [
         "# Blind check",
         "",
-        f"{seen} {'case' if seen == 1 else 'cases'}, {origin}, made by a second plant that shares "
-        f"nothing with the simulated rig; version {manifest.version}.{ended} How cases are made "
-        f"and scored was frozen as {manifest.frozen[:16]} before the first.{changed} The SHA-256 "
+        f"{len(ours)} {'case' if len(ours) == 1 else 'cases'}{many}, made by a second plant that "
+        "shares nothing with the simulated rig. "
+        + " ".join(_origin(source, found) for source in sources)
+        + " The SHA-256 "
         "of every answer was written down before the case was diagnosed, that of all verdicts "
         "before the first answer was unsealed. Who knows the seed can make the cases again: the "
         "seal guards against accident and later change, not against a user who breaks it.",
@@ -173,6 +233,22 @@ def _text(
         *_misses(ours),
         *_failures(outcomes),
     ]
+
+
+def _origin(source: _Source, found: Scores) -> str:
+    """Return in words which check it was: its seed, cases, version and what was frozen."""
+    manifest = source.manifest
+    changed = "" if found.frozen == manifest.frozen else (
+        f" **The sources that score are others now: {found.frozen[:16]}.**"
+    )  # fmt: skip
+    ended = "" if source.seen == source.planned else (
+        f" The check was ended after {source.seen} of {source.planned} cases."
+    )  # fmt: skip
+    return (
+        f"Seed {source.seed}: {source.seen} {'case' if source.seen == 1 else 'cases'}, version "
+        f"{manifest.version}.{ended} How cases are made and scored was frozen as "
+        f"{manifest.frozen[:16]} before the first.{changed}"
+    )
 
 
 def _world(world: World, found: Scores) -> list[str]:

@@ -19,7 +19,7 @@ from fjr_validation.blind.check import BlindCheck, split
 from fjr_validation.blind.frozen import FROZEN, frozen_digest
 from fjr_validation.blind.json_lines import JsonLines
 from fjr_validation.blind.methods import METHODS, verdict
-from fjr_validation.blind.report import score_check
+from fjr_validation.blind.report import score_check, score_together
 from fjr_validation.blind.score import Scores
 from fjr_validation.blind.seal import Secret, decrypt, encrypt, opened_line, sealed_line
 
@@ -118,7 +118,7 @@ def test_a_finished_check_is_scored_from_its_raw_file_and_again(state, tmp_path)
     fill(check, ["closed_0000", "closed_0001"])
     report = score_check(check)
     text = report.read_text()
-    assert f"2 cases, seed {SEED}" in text and frozen_digest()[:16] in text
+    assert f"Seed {SEED}: 2 cases" in text and frozen_digest()[:16] in text
     for name in ("named", "present"):
         assert (report.parent / f"{name}.png").stat().st_size > 3000 and f"({name}.png)" in text
     scores = Scores.read(report.parent / "scores.json")
@@ -134,6 +134,28 @@ def test_an_unfinished_check_can_be_ended_and_says_so(state, tmp_path):
     assert "ended after 1 of 2 cases" in text
     with pytest.raises(InputError, match="answers are unsealed"):
         check.run()
+
+
+def test_several_checks_make_one_report(state, tmp_path):
+    checks = []
+    for seed, names in ((203, ["closed_0000", "closed_0001"]), (204, ["closed_0000"])):
+        check = BlindCheck.begin(tmp_path / str(seed), CASES, seed, ["refit"])
+        fill(check, names)
+        checks.append(check)
+    with pytest.raises(InputError, match="203 is still sealed"):
+        score_together(checks, tmp_path / "both")
+    for check in checks:
+        score_check(check, unfinished=True)
+    folders = [str(check.folder) for check in checks]
+    ran = CliRunner().invoke(app, ["blind", "score", *folders, "--out", str(tmp_path / "both")])
+    assert ran.exit_code == 0, ran.output
+    text = (tmp_path / "both" / "report.md").read_text()
+    assert "3 cases of 2 checks" in text and "Seed 203: 2 cases" in text
+    assert "Seed 204: 1 case," in text and "ended after 1 of 2 cases" in text
+    scores = Scores.read(tmp_path / "both" / "scores.json")
+    assert scores.methods["refit"]["closed"]["nothing_named"].cases == 3
+    with pytest.raises(InputError, match="the same check twice"):
+        score_together([checks[0], checks[0]], tmp_path / "both")
 
 
 def test_a_changed_verdict_is_found(state, tmp_path):
