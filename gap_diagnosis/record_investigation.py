@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 
 from fjr_kit.errors import InputError
 from fjr_records.records import Record, RecordSet
-from fjr_sim_node import effects as fx
 
 from .gates.bag_deviations import GROUPS
 from .gates.bags_gate import as_bags, record_changes, scattering
@@ -22,6 +21,7 @@ from .outcome.verdict_words import OUT_OF_TIME
 from .record_judgement import FEWEST_PARTS, Tested, judge_records, tested_causes
 from .which.catalogue import catalogue
 from .which.cell_fits import CellFit, CellFitter
+from .which.equivalents import partners
 from .which.estimates import moved_by_scatter, relative_scatter
 from .which.search_space import TOLERANCE
 from .which.stepwise import Found, Stepwise, gain, stands_for
@@ -227,9 +227,9 @@ def _alternatives(
 ) -> list[str]:
     """Return the effects that do as well in place of a cause, all else fitted anew."""
     best = found.best
-    tried = {*fx.near_equivalents(tested.effect), *found.alternatives.get(tested.effect, ())}
+    tried = {*partners([tested.effect], set(names)), *found.alternatives.get(tested.effect, ())}
     tied = []
-    for effect in sorted((tried & set(names)) - set(best.effects)):
+    for effect in sorted(tried - set(best.effects)):
         proposals = fitter.screening(tested.without, effect).proposals()
         other = fitter.add(tested.without, effect, proposals) if proposals else None
         if other is None:

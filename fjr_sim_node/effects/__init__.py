@@ -36,6 +36,7 @@ __all__ = [
     "EffectParameter",
     "coefficients",
     "contains",
+    "holders",
     "near_equivalents",
     "parameter",
 ]
@@ -86,6 +87,12 @@ def near_equivalents(identifier: str) -> frozenset[str]:
     return frozenset(e.identifier for e in CATALOGUE if family and e.looks_like == family) - {
         identifier
     }
+
+
+def holders(identifier: str) -> frozenset[str]:
+    """Return the effects that hold one as a limit case and are looked for on request only."""
+    found = (e.identifier for e in CATALOGUE if e.on_request and identifier in e.contains)
+    return frozenset(found)
 
 
 def contains(richer: Collection[str], simpler: Collection[str]) -> bool:

@@ -58,6 +58,7 @@ class Misfit:
         self._scale = np.sqrt(2.0) / np.hypot(std, model_error * np.abs(self.measured))
         self._scale[..., 0] /= np.sqrt(2.0)  # DC is real: all its variance is in one part
         self._scale[:, 1:, 0] = 0.0
+        self._noise = float(np.sum(std[:, 0] ** 2))
 
     @property
     def size(self) -> int:
@@ -110,6 +111,14 @@ class Misfit:
         """Return the chi-square of one model, per degree of freedom."""
         errors = self.errors([model])[0]
         return float(errors @ errors) / self.size
+
+    def left(self, model: Model) -> float:
+        """Return what a model leaves of y beyond noise, all lines alike: sum of squares (rad2).
+
+        In the chi-square an offset is one line of many, however far the rig moves by it.
+        """
+        lines = line_spectrum(self._simulator.many([model], self.which)[0, :, 0], self._lines)
+        return float(np.sum(np.abs(lines - self.measured[:, 0]) ** 2)) - self._noise
 
 
 def _outputs(recorded: RecordedExperiment, index: int) -> np.ndarray:

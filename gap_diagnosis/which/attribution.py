@@ -26,6 +26,9 @@ times the next explanation's misfit over its own. A rig's law is never exactly t
 right one may leave a lot; what only substitutes for an unknown effect has others nearly as good
 (at most 18 on the training cases it was set by, right ones at least 90; one later substitute, a
 ripple of the torque constant that goes for cogging, passed)."""
+MOST_LEFT = 0.5
+"""Greatest share of the error of the motion, squared, that an explanation may leave unless noise is
+all it leaves: what is left has a cause of its own."""
 TIE = 0.5
 """Explanations can't be told apart if their misfits differ by less than this share of what even
 the best leaves beyond noise: so much the model's own form may be wrong."""

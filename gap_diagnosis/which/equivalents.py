@@ -17,6 +17,20 @@ def partners(found: Sequence[str], among: set[str]) -> list[str]:
     return sorted(among & alike)
 
 
+def holders(found: Sequence[str], among: Sequence[str]) -> list[str]:
+    """Return what holds one of some effects as a limit case and is not looked for by itself.
+
+    A law of several parts, such as LuGre friction, is too costly to be tried on every rig, and not
+    needed where one of its parts does as well; where one leads, the whole may be what is there.
+
+    Args:
+        found: identifiers of what leads.
+        among: what is looked for; a law counts where all its parts are.
+    """
+    every = {other for effect in found for other in fx.holders(effect)} - set(among)
+    return sorted(e for e in every if set(fx.EFFECTS[e].contains) <= set(among))
+
+
 def stands_for(effects: Sequence[str], others: Sequence[str]) -> bool:
     """Tell whether explanations differ by one effect and a near equivalent of it."""
     mine, theirs = set(effects) - set(others), set(others) - set(effects)

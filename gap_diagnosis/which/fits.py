@@ -16,7 +16,7 @@ from ..model.simulated_rig import Model, Simulator
 from .catalogue import catalogue
 from .least_squares import Solution, solve
 from .ripples import RippleSearch
-from .screening import Proposal, Screening
+from .screening import Costs, Proposal, Screening, sums_of_squares
 from .search_space import TOLERANCE, Scales, Space, space_for, starts
 
 _KEPT_STARTS = 2
@@ -101,7 +101,13 @@ class Fitter:
         self.tolerance = tolerance
         self.train = Misfit(recorded, simulator, noise_std, train)
         self.held = Misfit(recorded, simulator, noise_std, held)
+        self._few = [next(i for i in train if self._levels[i] == k) for k in self._train_levels]
+        self._screened = self._misfit(self._few)
         self.scales = Scales.of_experiment(recorded, self.nominal)
+
+    @property
+    def _train_levels(self) -> list[int]:
+        return sorted({self._levels[i] for i in self.train.which})
 
     def refit(self) -> Fit:
         """Fit the base parameters alone, level after level added from the lowest amplitude up.
@@ -111,8 +117,7 @@ class Fitter:
         """
         space = Space(self.nominal, (), (), self.tolerance, self.scales)
         x = np.zeros(len(self.nominal))
-        levels = sorted({self._levels[i] for i in self.train.which})
-        for highest in levels[:-1]:
+        for highest in self._train_levels[:-1]:
             misfit = self._misfit([i for i in self.train.which if self._levels[i] <= highest])
             x = self._reached(space, x, misfit, _FIRST_STEPS).x
         return self.solve((), space, x)
@@ -159,17 +164,46 @@ class Fitter:
         return solve(residuals, x, *space.bounds(), most_steps=steps, known=known)
 
     def screening(self, parent: Fit, effect: str) -> Screening:
-        """Return what the starts of an effect promise beside a fit."""
+        """Return what the starts of an effect promise beside a fit.
+
+        They are tried on one realization of each level, and cost as much as they would if all the
+        others answered alike.
+        """
         cycles = None
         if fx.EFFECTS[effect].ripple and self.recorded.repeatable:
             cycles = self.ripples(effect, parent).cycles(RIPPLES_TRIED)
+        solution = self._solution_of_few(parent)
         return Screening(
-            parent.solution,
+            solution,
             parent.model,
             starts(effect, self.scales, cycles, self.nominal),
             partial(self.space, parent),
-            self.errors,
+            self._screened.errors,
+            self._costs_of_few(parent, solution),
         )
+
+    def promise(self, screened: Screening, parent: Fit) -> float:
+        """Return what an effect promises beside a fit, by a screening beside another one."""
+        solution = self._solution_of_few(parent)
+        one = np.ones(solution.residuals.size)
+        return screened.gain_beside(solution, one, self._costs_of_few(parent, solution))
+
+    def _solution_of_few(self, parent: Fit) -> Solution:
+        solution, size = parent.solution, len(self.train.which)
+        place = [self.train.which.index(i) for i in self._few]
+        residuals = solution.residuals.reshape(size, -1)[place].ravel()
+        return replace(
+            solution, residuals=residuals, jacobian=self._rows(parent, self._few),
+            cost=float(residuals @ residuals),
+        )  # fmt: skip
+
+    def _costs_of_few(self, parent: Fit, few: Solution) -> Costs:
+        scale = parent.train_chi2 / few.cost
+
+        def costs(errors: np.ndarray) -> np.ndarray:
+            return scale * sums_of_squares(errors)
+
+        return costs
 
     def ripples(self, effect: str, parent: Fit) -> RippleSearch:
         """Return what ripples of an effect could do about the errors that a fit leaves."""

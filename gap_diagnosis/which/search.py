@@ -16,6 +16,7 @@ from fjr_sim_node import effects as fx
 
 from .attribution import (
     CERTAIN,
+    MOST_LEFT,
     NOTHING_LEFT,
     PLAIN,
     SECOND_GAIN,
@@ -25,11 +26,12 @@ from .attribution import (
     stands_out,
     tie_limit,
 )
-from .equivalents import SCALES, partners, stands_for
+from .equivalents import SCALES, holders, partners, stands_for
 from .estimates import sure
 from .fits import Fit, Fitter
 from .harmonics import with_second_harmonics
 from .reduced_fits import without, without_scale
+from .screening import Screening
 
 _FINALISTS = 4
 _CLOSE = 2.0
@@ -37,10 +39,12 @@ _GIVE_UP = 4.0
 _NEAR = 10.0
 _ALIKE = 1.3  # near equivalents that fit worse than this are looked for again from each other
 _WORTH_A_PAIR = 2.0
+_FORM = 0.0025  # of the misfit: a law is wrong by up to 5 % (rms) of what it does
 _WORTH_A_HARMONIC = 1.3
 _SECOND_PROMISE = 1.2  # a second effect that has not gained that much after a few steps is dropped
 _PROMISING_SECONDS = 5
 _PROMISING_PARTNERS = 2
+_HELD = 2  # of the leading effects: what holds one of them is tried as well
 _SCREENED = 2  # times as many are tried at several sizes as are fitted
 
 Progress = Callable[[str], None]
@@ -57,6 +61,7 @@ class Search:
         self._until, self._complete = until, True
         self._fits: dict[tuple[str, ...], Fit] = {}
         self._refit: Fit | None = None
+        self._first: dict[str, Screening] = {}
         self._groups = fitter.train.groups()
 
     def misfit(self, fit: Fit) -> float:
@@ -88,6 +93,8 @@ class Search:
         self._progress("refit of the base parameters")
         refit = self._refit = self._fitter.refit()
         self._extend(refit, self._fitter.catalogue)
+        leading = [fit.effects[0] for fit in self._ranked(1)[:_HELD]]
+        self._extend(refit, holders(leading, self._fitter.catalogue))
         best = refit
         self._polish(1)
         self._enrich(1)
@@ -116,14 +123,13 @@ class Search:
         least = min(parent.train_chi2, *rivals) if rivals else parent.train_chi2
         settled = self._settled(len(parent.effects) + 1, near)
         effects = [e for e in effects if tuple(sorted((*parent.effects, e))) not in settled]
-        screened = {effect: self._fitter.screening(parent, effect) for effect in effects}
-        hopeful = sorted(effects, key=lambda effect: -screened[effect].gain)
-        if most is not None:
-            hopeful = hopeful[: _SCREENED * most]
+        hopeful, screened = self._screenings(parent, effects, most)
         proposals = {effect: screened[effect].proposals() for effect in hopeful}
         ordered = sorted(hopeful, key=lambda effect: proposals[effect][0][0])[:most]
         for partner in partners(ordered[:_PROMISING_PARTNERS], set(effects) - set(ordered)):
-            proposals.setdefault(partner, screened[partner].proposals())
+            if partner not in proposals:
+                again = screened.get(partner) or self._fitter.screening(parent, partner)
+                proposals[partner] = again.proposals()
             ordered.append(partner)
         for number, effect in enumerate(ordered, 1):
             if self._over:
@@ -138,6 +144,30 @@ class Search:
             if key not in self._fits or fit.train_chi2 < self._fits[key].train_chi2:
                 self._fits[key] = fit
             least = min(least, fit.train_chi2)
+
+    def _screenings(
+        self, parent: Fit, effects: Sequence[str], most: int | None
+    ) -> tuple[list[str], dict[str, Screening]]:
+        """Return the hopeful ones of some effects, best first, and screenings beside a fit.
+
+        What a seed changes hardly depends on the effects beside it: so the first screenings say
+        which may gain as a second effect, and only those are screened anew, and ripples, whose
+        period depends on what is left.
+        """
+        if most is None or not self._first:
+            screened = {effect: self._fitter.screening(parent, effect) for effect in effects}
+            self._first = self._first or screened
+        else:
+            promise = {
+                e: self._fitter.promise(self._first[e], parent)
+                for e in effects
+                if e in self._first and not fx.EFFECTS[e].ripple
+            }
+            best = sorted(promise, key=lambda e: -promise[e])[: _SCREENED * most]
+            again = [e for e in effects if e in best or e not in promise]
+            screened = {effect: self._fitter.screening(parent, effect) for effect in again}
+        hopeful = sorted(screened, key=lambda effect: -screened[effect].gain)
+        return (hopeful if most is None else hopeful[: _SCREENED * most]), screened
 
     @property
     def _over(self) -> bool:
@@ -195,6 +225,9 @@ class Search:
             return left < PLAIN
         if left < NOTHING_LEFT:
             return True
+        motion = [self._fitter.held.left(fit.model) for fit in (best, refit)]
+        if motion[0] > MOST_LEFT * motion[1]:
+            return False
         return stands_out(left, self.misfit(refit), self._next(refit, best)) > STANDS_OUT
 
     def _next(self, refit: Fit, best: Fit) -> float:
@@ -212,7 +245,7 @@ class Search:
 
     def _effects_needed(self, best: Fit) -> int:
         """Search forward, backward and by swaps for a second effect; return how many to name."""
-        if self.misfit(best) < _WORTH_A_PAIR:
+        if self.misfit(best) < _WORTH_A_PAIR or self._owed_to_its_form(best):
             return 1
         for parent in self._ranked(1)[:2]:
             if self.misfit(parent) < _NEAR * self.misfit(best):
@@ -227,6 +260,11 @@ class Search:
             self._drop_scales()
             best = self._sure(1)[0]
         return 2 if self._pair_called_for(best, self._sure(2)) else 1
+
+    def _owed_to_its_form(self, best: Fit) -> bool:
+        """Tell whether an effect leaves no more of the gap than its law's form may be wrong by."""
+        assert self._refit is not None
+        return self.misfit(best) - 1.0 < _FORM * (self.misfit(self._refit) - 1.0)
 
     def _pair_called_for(self, best: Fit, pairs: Sequence[Fit]) -> bool:
         return bool(pairs) and self._calls_for(best, pairs[0], SECOND_GAIN)
@@ -255,12 +293,13 @@ class Search:
                 del self._fits[pair.effects]
 
     def _swap(self, best: Fit) -> None:
-        """Fit the best pair with each member replaced by its near equivalents."""
+        """Fit the best pair with each member replaced by what is near it or holds it."""
         pairs = self._ranked(2)
         if not pairs or not self._calls_for(best, pairs[0], SECOND_GAIN):
             return
         for kept, swapped in (pairs[0].effects, pairs[0].effects[::-1]):
             alike = partners([swapped], set(self._fitter.catalogue) - {kept, swapped})
+            alike += holders([swapped], self._fitter.catalogue)
             if alike:
                 self._extend(without(self._fitter, pairs[0], swapped), alike, near=_ALIKE)
 

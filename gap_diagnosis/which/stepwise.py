@@ -16,6 +16,7 @@ from scipy import stats
 from fjr_sim_node import effects as fx
 
 from .cell_fits import CellFit, CellFitter
+from .equivalents import holders, partners
 from .screening import Screening
 
 MOST_CAUSES = 4
@@ -164,7 +165,7 @@ class Stepwise:
         proposals = {e: screened[e].proposals() for e in hopeful}
         ordered = sorted((e for e in hopeful if proposals[e]), key=lambda e: proposals[e][0][0])
         chosen = ordered[:_FITTED]
-        alike = {p for e in chosen[:2] for p in fx.near_equivalents(e)} & set(effects)
+        alike = {*partners(chosen[:2], set(effects)), *holders(chosen[:2], self._effects)}
         for effect in sorted(alike - set(chosen)):
             if effect not in proposals:
                 again = screened.get(effect) or self._fitter.screening(parent, effect)
