@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from gap_cases import SHORT, simulate_case, true_parameters
+from gap_cases import SHORT, fitter_of, simulate_case, true_parameters
 
 from fjr_records.noise import noise_levels
 from fjr_sim_node.plant import PLANT
 from gap_diagnosis.model.simulated_rig import Model, Simulator
 from gap_diagnosis.notes import unexplained
+from gap_diagnosis.which import search
 from gap_diagnosis.which.attribution import STANDS_OUT, Attribution, stands_out
 from gap_diagnosis.which.fits import Fit, Fitter
 from gap_diagnosis.which.least_squares import Solution
@@ -50,6 +51,48 @@ def test_a_gain_is_no_second_cause_beside_a_mode_on_a_rig_beyond_the_tolerance()
     assert found.best.model.effects["extra_mode.inertia_kg_m2"] == pytest.approx(0.1, rel=0.01)
     for name, value in plant.items():
         assert found.best.model.plant[name] == pytest.approx(value, rel=0.01)
+
+
+def searched(truth, few):
+    recorded = simulate_case(truth, seed=3, off=0.02, **SHORT).recorded
+    noise = noise_levels(recorded).of_outputs(recorded)
+    nominal = Model.nominal(PLANT.defaults()).plant
+    fitter = Fitter(recorded, Simulator(recorded), noise, nominal, (0, 2), (1, 3), 0.03, few)
+    return Search(fitter).run()
+
+
+def test_lugre_friction_is_named_where_one_of_its_parts_leads():
+    truth = {
+        "lugre_friction.stribeck_nm": 6.0,
+        "lugre_friction.bristle_nm_rad": 3e4,
+        "lugre_friction.velocity_rad_s": 0.05,
+    }
+    parts = ("presliding_friction", "stribeck_friction_motor", "backlash")
+    found = searched(truth, parts)
+    assert found.best.effects == ("lugre_friction",) and found.explained
+    assert found.best.model.effects["lugre_friction.stribeck_nm"] == pytest.approx(6.0, rel=0.1)
+    alone = searched(truth, ("presliding_friction", "backlash"))
+    assert all("lugre_friction" not in fit.effects for fit in alone.candidates)
+
+
+def test_what_a_law_leaves_by_its_own_form_is_no_second_cause(monkeypatch):
+    """A lag that is a little off, as the rig of another maker has it, is no lag and a delay."""
+    truth = {"actuator_lag.time_constant_s": 3e-3, "delay.time_s": 2.5e-4}
+    few = ("actuator_lag", "delay")
+    assert searched(truth, few).best.effects == ("actuator_lag",)
+    monkeypatch.setattr(search, "_FORM", 0.0)
+    assert set(searched(truth, few).best.effects) == set(few)
+
+
+def test_an_offset_counts_by_how_far_the_rig_is_moved():
+    bias = {"torque_bias.torque_nm": 1.0}
+    case = simulate_case(bias, seed=3, **SHORT)
+    _, simulator, fitter = fitter_of(case)
+    bare, biased = Model(case.truth.plant, {}), case.truth
+    moved = [a - b for a, b in zip(*(simulator.signals(m)[0] for m in (bare, biased)), strict=True)]
+    expected = sum(np.mean(moved[i]) ** 2 for i in fitter.held.which)
+    assert fitter.held.left(bare) == pytest.approx(expected, rel=0.3)
+    assert abs(fitter.held.left(biased)) < 0.05 * expected
 
 
 def fit(effects: tuple[str, ...], held_chi2: float, converged: bool = True) -> Fit:
