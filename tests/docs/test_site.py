@@ -52,7 +52,7 @@ def test_no_page_loads_anything_from_elsewhere(site: Path):
 
 
 def test_a_page_opened_from_the_folder_can_search(site: Path):
-    """A browser gives such a page neither a file that it asks for nor a worker: both are scripts."""
+    """A browser gives it neither a file that it asks for nor a worker: both are scripts."""
     assert (site / "search/search_index.js").read_text(encoding="utf-8").startswith("var __index")
     for page, script in (("index", "scripts"), ("tutorials/gap", "../scripts")):
         text = (site / f"{page}.html").read_text(encoding="utf-8")
