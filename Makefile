@@ -42,7 +42,8 @@ demo: $(INSTALLED) ## install everything, run a campaign on the ROS graph, write
 	@$(BIN)/fjr demo
 
 test: $(INSTALLED) ## install everything, run the tests: 20 to 35 minutes on two cores
-	@$(PYTEST) -n 2 --dist loadfile --no-loadscope-reorder
+	@echo "All tests: 20 to 35 minutes on two cores. make test-quick takes one or two."
+	$(PYTEST) -n 2 --dist loadfile --no-loadscope-reorder
 
 test-quick: $(INSTALLED) ## run the tests of the cores that take least: one or two minutes
 	@$(PYTEST) -n 2 --dist loadfile -m 'not ros and not slow' $(QUICK)

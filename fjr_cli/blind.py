@@ -62,7 +62,7 @@ def run(
     dask: Dask = None,
     workers: Workers = None,
     keep_bags: Annotated[
-        bool, typer.Option(help="Keep the bags of finished cases (some 15 MB each).")
+        bool, typer.Option(help="Keep the bags of finished cases (2 to 50 MB each).")
     ] = False,
     dry_run: DryRun = False,
 ) -> None:

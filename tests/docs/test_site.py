@@ -80,5 +80,5 @@ def test_the_api_has_every_public_name(site: Path):
 
 def test_the_glossary_has_every_term(site: Path):
     page = (site / "glossary.html").read_text(encoding="utf-8")
-    terms = ("BLA", "Level", "Realization", "V", "G0", "Disc", "M, P", "Gap", "Remainder")
+    terms = ("BLA", "Level", "Realization", "V", "G0", "Disc", "M", "P", "Gap", "Remainder")
     assert [term for term in terms if f"<strong>{term}.</strong>" not in page] == []
