@@ -14,11 +14,11 @@ from .reproduction import further_tasks
 from .settings import CASES, QUICK, Settings
 
 OTHERS, OTHERS_QUICK = 3.6, 7.0
-"""Processor time of all other experiments over that of the sweep: 190 s beside 52 s in a full run, 70
-s beside 10 s in a quick one."""
+"""Processor time of all other experiments over that of the sweep: 190 s beside 52 s in a full run,
+70 s beside 10 s in a quick one."""
 
 _BYTES, _BYTES_QUICK = 40e6, 15e6
-"""Report, figures and kept results: of a quick run 8 MB are results, which grow with the repeats."""
+"""Report, figures and kept results; 8 MB of a quick run are results, which grow with repeats."""
 
 
 @dataclass(frozen=True)
