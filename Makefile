@@ -12,22 +12,16 @@ BIN := $(VENV)/bin
 ifdef ROS_DISTRO
 RCLPY := installed
 LOCK := requirements-installed-ros.lock
-EXTRAS := report,dask,export,rivals,dev
 VENV_OPTIONS := --system-site-packages
 else
 RCLPY := wheels
 LOCK := requirements.lock
-EXTRAS := report,dask,export,rivals,dev,ros
 VENV_OPTIONS :=
 endif
 
 PYTHON_VERSION := $(shell $(PYTHON) -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2>/dev/null)
 INSTALLED := $(VENV)/.installed-$(RCLPY)-python$(PYTHON_VERSION)
-BENCH_INSTALLED := $(INSTALLED)-bench
-DOCS_INSTALLED := $(INSTALLED)-docs
-
-# The lock is given as constraints: what is installed is decided by pyproject.toml, its version here.
-PIP_INSTALL := $(BIN)/python -m pip install --quiet --use-pep517 --disable-pip-version-check --constraint $(LOCK)
+PIP_INSTALL := $(BIN)/python -m pip install --quiet --use-pep517 --disable-pip-version-check
 
 # A sourced ROS 2 puts pytest plugins of its own on the path: load only ours.
 PYTEST := PYTEST_DISABLE_PLUGIN_AUTOLOAD=1 $(BIN)/python -m pytest -p xdist.plugin -p _hypothesis_pytestplugin
@@ -48,7 +42,8 @@ demo: $(INSTALLED) ## install everything, run a campaign on the ROS graph, write
 	@$(BIN)/fjr demo
 
 test: $(INSTALLED) ## install everything, run the tests: 20 to 35 minutes on two cores
-	@$(PYTEST) -n 2 --dist loadfile --no-loadscope-reorder
+	@echo "All tests: 20 to 35 minutes on two cores. make test-quick takes one or two."
+	$(PYTEST) -n 2 --dist loadfile --no-loadscope-reorder
 
 test-quick: $(INSTALLED) ## run the tests of the cores that take least: one or two minutes
 	@$(PYTEST) -n 2 --dist loadfile -m 'not ros and not slow' $(QUICK)
@@ -61,10 +56,10 @@ ws: $(INSTALLED) ## build the ROS packages in ros_ws with colcon, test what was 
 	$(COLCON) test-result --verbose
 	exit $${status-0}
 
-bench: $(BENCH_INSTALLED) ## measure the figures of benchmarks/ on this machine
+bench: $(INSTALLED) ## measure the figures of benchmarks/ on this machine
 	@$(BIN)/python -m benchmarks
 
-docs: $(DOCS_INSTALLED) ## build the documentation site; a broken link or reference fails
+docs: $(INSTALLED) ## build the documentation site; a broken link or reference fails
 	@NO_MKDOCS_2_WARNING=1 PYTHONPATH=. $(BIN)/python -m mkdocs build --strict --quiet
 	echo build/site/index.html
 
@@ -74,11 +69,10 @@ lint: $(INSTALLED) ## check style and types
 	$(BIN)/mypy
 
 lock: ## compile both lock files anew (needs uv)
-	@compile() { uv pip compile --quiet --universal --strip-extras --custom-compile-command 'make lock' "$$@"; }
-	echo 'setuptools>=77' | compile pyproject.toml - --python-version 3.10 \
-	  --extra report --extra dask --extra ros --extra dev --extra docs --extra bench --extra export --extra rivals --output-file requirements.lock
-	printf '%s\n' 'setuptools>=77' 'numpy<2' | compile pyproject.toml - --python-version 3.12 \
-	  --extra report --extra dask --extra dev --extra docs --extra bench --extra export --extra rivals --output-file requirements-installed-ros.lock
+	@extras=(--extra={report,dask,dev,docs,bench,export,rivals})
+	compile() { uv pip compile --quiet --universal --strip-extras --generate-hashes --custom-compile-command 'make lock' pyproject.toml - "$${extras[@]}" "$$@"; }
+	echo 'setuptools>=77' | compile --python-version 3.10 --extra ros --output-file requirements.lock
+	printf '%s\n' 'setuptools>=77' 'numpy<2' | compile --python-version 3.12 --output-file requirements-installed-ros.lock
 	! grep -nE '://|^--' requirements.lock requirements-installed-ros.lock
 
 clean: ## remove .venv and everything that tools left behind
@@ -107,14 +101,6 @@ check-machine:
 $(INSTALLED): pyproject.toml $(LOCK) | check-machine
 	@echo "Installing into $(VENV) (Python $(PYTHON_VERSION), rclpy: $(RCLPY)) ..."
 	if [ ! -e $@ ]; then rm -rf $(VENV); $(PYTHON) -m venv $(VENV_OPTIONS) $(VENV); fi
-	$(PIP_INSTALL) setuptools
-	$(PIP_INSTALL) --no-build-isolation --editable '.[$(EXTRAS)]'
-	touch $@
-
-$(BENCH_INSTALLED): $(INSTALLED)
-	@$(PIP_INSTALL) --no-build-isolation --editable '.[$(EXTRAS),bench]'
-	touch $@
-
-$(DOCS_INSTALLED): $(INSTALLED)
-	@$(PIP_INSTALL) --no-build-isolation --editable '.[$(EXTRAS),docs]'
+	$(PIP_INSTALL) --require-hashes --requirement $(LOCK)
+	$(PIP_INSTALL) --no-deps --no-build-isolation --editable .
 	touch $@

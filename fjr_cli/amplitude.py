@@ -40,7 +40,14 @@ def amplitude(
     It measures upward until distortion rises again, or takes the levels that bags hold already, as
     those of a hardware rig.
     """
-    from fjr_bringup.design.amplitude import Limits, bag_levels, evaluate, search, within
+    from fjr_bringup.design.amplitude import (
+        Limits,
+        bag_levels,
+        evaluate,
+        most_levels,
+        search,
+        within,
+    )
     from fjr_kit.folder_lock import locked_folder
 
     limits = Limits(options.torque_limit, options.position_limit)
@@ -52,6 +59,9 @@ def amplitude(
         found = evaluate(usable, ended_by)
     else:
         campaign = options.campaign(rig)
+        if options.dry_run:
+            options.print_estimate(campaign, most_levels(lowest, highest))
+            return
         with locked_folder(out) if options.graph else nullcontext():
             found = search(
                 campaign,

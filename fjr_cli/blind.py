@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from enum import Enum
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from .campaign_options import DryRun, duration, size
 from .cli_errors import reports_errors
 from .worker_options import Dask, Workers
 
@@ -60,8 +62,9 @@ def run(
     dask: Dask = None,
     workers: Workers = None,
     keep_bags: Annotated[
-        bool, typer.Option(help="Keep the bags of finished cases (10 to 50 MB each).")
+        bool, typer.Option(help="Keep the bags of finished cases (2 to 50 MB each).")
     ] = False,
+    dry_run: DryRun = False,
 ) -> None:
     """Make sealed cases, diagnose them, commit to the verdicts, unseal and score."""
     from fjr_kit.installed import require_report_extra
@@ -75,6 +78,9 @@ def run(
     from fjr_validation.blind.report import rehearse_report, score_check
 
     worlds = [each for each in WORLDS if not world or WorldName(each) in world]
+    if dry_run:
+        _print_estimate(out, split(cases, worlds), seed, method or (OURS,), workers, keep_bags)
+        return
     with locked_folder(out), ProgressLine() as progress:
         check = BlindCheck.begin(out, split(cases, worlds), seed, method or (OURS,))
         check.check_seals()
@@ -82,6 +88,31 @@ def run(
         check.run(dask, workers, progress.report, keep_bags=keep_bags)
         report = score_check(check)
     typer.echo(report)
+
+
+def _print_estimate(
+    out: Path,
+    cases: Mapping[str, int],
+    seed: int | None,
+    methods: Sequence[str],
+    workers: int | None,
+    keep_bags: bool,
+) -> None:
+    from fjr_kit.worker_pool import worker_count
+    from fjr_validation.blind.estimate import CASE_BYTES, estimate
+
+    found = estimate(out, cases, seed, methods)
+    worlds = ", ".join(f"{count} {world}" for world, count in cases.items())
+    typer.echo(f"{found.cases} cases ({worlds}) by {', '.join(methods)}; {found.missing} to do.")
+    count = worker_count(workers, max(found.missing, 1))
+    kept = found.cases if keep_bags else min(2 * count, found.missing)
+    why = "which are kept" if keep_bags else "of cases under way"
+    typer.echo(f"Disk: about {size(kept * CASE_BYTES)} of bags, {why}.")
+    source = "its own verdicts" if found.measured else "training cases; your machine may differ"
+    typer.echo(
+        f"Time: about {duration(found.processor_s)} of processor time, "
+        f"{duration(found.processor_s / count)} with {count} processes, from {source}."
+    )
 
 
 @blind.command()

@@ -101,13 +101,16 @@ def described_campaign(
     return Campaign.create(rig, overrides)
 
 
-def print_estimate(campaign: Campaign, folder: Path | None, *, on_graph: bool) -> None:
+def print_estimate(
+    campaign: Campaign, folder: Path | None, *, on_graph: bool, bags: bool = True
+) -> None:
     """Print what a campaign will take.
 
     Args:
         campaign: what is to be played.
         folder: its experiment folder; None for a new one.
         on_graph: whether it is played on the ROS graph, or simulated in batch.
+        bags: whether they are written.
     """
     from fjr_bringup.campaign.estimate import estimate
     from fjr_kit.worker_pool import worker_count
@@ -115,27 +118,30 @@ def print_estimate(campaign: Campaign, folder: Path | None, *, on_graph: bool) -
     found = estimate(campaign, folder)
     typer.echo(
         f"{campaign.levels} levels, {found.bags} bags of {found.samples} samples; "
-        f"{found.pending} to record, {_duration(found.simulated_s)} of simulated time."
+        f"{found.pending} to record, {duration(found.simulated_s)} of simulated time."
     )
-    typer.echo(f"Disk: {_size(found.disk_bytes)}, measured on one period.")
+    if bags:
+        typer.echo(f"Disk: {size(found.disk_bytes)}, measured on one period.")
     if on_graph:
         typer.echo(
-            f"Time: about {_duration(found.graph_s)} of processor time, at 1 ms a sample, which "
+            f"Time: about {duration(found.graph_s)} of processor time, at 1 ms a sample, which "
             "two or more cores share."
         )
         return
     workers = worker_count(None, found.pending)
     typer.echo(
-        f"Time: about {_duration(found.batch_s / max(workers, 1))} with {workers} processes, from "
+        f"Time: about {duration(found.batch_s / max(workers, 1))} with {workers} processes, from "
         "one period on this machine."
     )
 
 
-def _duration(seconds: float) -> str:
+def duration(seconds: float) -> str:
+    """Return a time as a person reads it."""
     if seconds < 120.0:
         return f"{max(seconds, 1.0):.0f} s"
     return f"{seconds / 60.0:.0f} min" if seconds < 7200.0 else f"{seconds / 3600.0:.1f} h"
 
 
-def _size(size: float) -> str:
-    return f"{size / 1e6:.1f} MB" if size < 1e9 else f"{size / 1e9:.1f} GB"
+def size(count: float) -> str:
+    """Return a size in bytes as a person reads it."""
+    return f"{count / 1e6:.1f} MB" if count < 1e9 else f"{count / 1e9:.1f} GB"

@@ -10,6 +10,7 @@ import typer
 from fjr_kit.errors import InputError, needing_ros
 
 from .cli_errors import reports_errors
+from .graph_options import RIG, Namespace
 
 
 @reports_errors(kept="what was recorded whole is kept")
@@ -42,6 +43,7 @@ def record(
     count: Annotated[
         int, typer.Option(min=1, help="Number of realizations of the rig, one bag each.")
     ] = 1,
+    namespace: Namespace = RIG,
 ) -> None:
     """Record a rig that was started by hand, or chosen topics of any rig, and audit the bags.
 
@@ -82,7 +84,7 @@ def record(
         audit(out)
     else:
         with locked_folder(out), CampaignProgress(done="recorded") as progress:
-            record_by_hand(out, count, progress, audit)
+            record_by_hand(out, count, progress, audit, namespace)
     typer.echo(out)
     if not all(well):
         raise typer.Exit(FOUND)

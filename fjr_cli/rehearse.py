@@ -13,6 +13,7 @@ from fjr_kit.invocation import command_line
 
 from .campaign_options import Rig, Set
 from .cli_errors import INTERRUPTED, reports_errors
+from .graph_options import RIG, Namespace
 
 NO_GO = 3
 """Exit status of a rehearsal that ends in NO-GO."""
@@ -79,6 +80,7 @@ def rehearse(
         Path | None,
         typer.Option(metavar="FOLDER", help="New folder; default: one below ./rehearsals."),
     ] = None,
+    namespace: Namespace = RIG,
     settings: Set = None,
 ) -> None:
     """Rehearse an experiment in real time and end in GO or NO-GO, with reasons.
@@ -107,6 +109,7 @@ def rehearse(
         hardware=hardware,
         confirm=confirm,
         network=network,
+        namespace=namespace,
         overrides=parse_settings(settings or []),
         command=command_line(),
     )

@@ -12,6 +12,7 @@ import typer
 from fjr_kit.errors import InputError, needing_ros
 
 from .cli_errors import reports_errors
+from .graph_options import RIG, Namespace
 
 if TYPE_CHECKING:
     from fjr_bringup.replay.publishing import Publishing
@@ -117,8 +118,12 @@ def replay(
             rich_help_panel=_PUBLISH,
         ),
     ] = None,
+    namespace: Namespace = RIG,
 ) -> None:
-    """Publish a bag with its clock, or play it into controller and simulated plant."""
+    """Publish a bag with its clock, or play it into controller and simulated plant.
+
+    With --into the nodes have a ROS domain of their own, and --namespace changes nothing.
+    """
     publishing = (rate, topics, start_offset_s, loop or None, follow_clock or None, wait_for)
     if into is None:
         if any(option is not None for option in (rig, settings, out)):
@@ -134,6 +139,7 @@ def replay(
             loop,
             tuple(wait_for or ()),
             follow_clock,
+            namespace,
         )
         _publish(bag, how)
         return

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .campaign_options import Realizations, Seed, Set, described_campaign
+from .campaign_options import DryRun, Realizations, Seed, Set, described_campaign, print_estimate
 
 if TYPE_CHECKING:
     from fjr_bringup.campaign.plan import Campaign
@@ -36,6 +36,7 @@ class SearchOptions:
     seed: Seed = None
     settings: Set = None
     graph: Graph = False
+    dry_run: DryRun = False
 
     def campaign(self, rig: Path | None, level: float | None = None) -> Campaign:
         """Return the campaign to measure by, of one amplitude of a line in rad if it is given."""
@@ -46,6 +47,14 @@ class SearchOptions:
             realizations=self.realizations,
             seed=self.seed,
         )
+
+    def print_estimate(self, campaign: Campaign, passes: int) -> None:
+        """Print what one pass over the campaign's greatest amplitude takes, and the most passes."""
+        from fjr_bringup.design.bench import altered
+
+        one = altered(campaign, amplitudes_rad=campaign.values["excitation"]["amplitudes_rad"][-1:])
+        print_estimate(one, None, on_graph=self.graph, bags=self.graph)
+        typer.echo(f"That is one pass; there are {passes} at the most.")
 
     def bench(self, out: Path) -> Bench:
         """Return the ROS graph, with bags below `out`, or the batch simulation, as asked for."""

@@ -50,6 +50,9 @@ def shape(
     from fjr_kit.folder_lock import locked_folder
 
     campaign = options.campaign(rig, level)
+    if options.dry_run:
+        options.print_estimate(campaign, iterations + 1)
+        return
     given: dict[str, Any] = {
         "tolerance_db": tolerance,
         "damping": damping,

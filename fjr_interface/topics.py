@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import re
 import struct
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
+from fjr_kit.errors import InputError, shown
+
 NAMESPACE = "/rig"
+"""Where the rig is in bags and parameter files, and by default on the graph."""
+
 JOINT = "joint"
 JOINT_STATE = "sensor_msgs/msg/JointState"
 STRING = "std_msgs/msg/String"
@@ -66,6 +71,22 @@ is not part of the experiment description either."""
 RECORDED_TOPIC = "recorded"
 """Stamp up to which a recorder has everything; the excitation never streams further than a window
 beyond it, so a slow recorder slows the lockstep instead of losing samples."""
+
+
+def checked_namespace(text: str) -> str:
+    """Return a namespace of the graph with its leading slash; raise InputError if it is none."""
+    words = text.strip("/").split("/")
+    if not all(re.fullmatch(r"[A-Za-z_]\w*", word, re.ASCII) for word in words):
+        raise InputError(
+            f"{shown(text)} is no ROS namespace: write words of letters, digits and underscores "
+            "that begin with no digit, such as /cell/left."
+        )
+    return "/" + "/".join(words)
+
+
+def moved_topic(topic: str, namespace: str) -> str:
+    """Return where a topic of a bag is on the graph: those of `/rig` lie in the namespace."""
+    return namespace + topic[len(NAMESPACE) :] if topic.startswith(f"{NAMESPACE}/") else topic
 
 
 _CLOCK = struct.Struct("<4siI")

@@ -210,9 +210,9 @@ class Starter:
         self._started.append(Started(self._folder, module, *arguments, **options))
         return self._started[-1]
 
-    def node(self, module: str, **parameters: Any) -> Started:
-        """Run a node with `-p name:=value`."""
-        arguments: list[str] = ["--ros-args"]
+    def node(self, module: str, *, namespace: str | None = None, **parameters: Any) -> Started:
+        """Run a node with `-p name:=value`, in a namespace if one is given."""
+        arguments: list[str] = ["--ros-args", *(["-r", f"__ns:={namespace}"] if namespace else [])]
         for name, value in parameters.items():
             arguments += ["-p", f"{name}:={value}"]
         return self(module, *arguments)

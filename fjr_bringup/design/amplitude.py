@@ -29,6 +29,8 @@ STEP = 1.6
 """Ratio of two amplitudes of the coarse search."""
 RISE = 1.5
 """The criterion has surely passed its least value when it is this much above it."""
+EXTRA = 5
+"""Most amplitudes beside the coarse ones: one just below a limit, four around the least value."""
 BOOTSTRAPS = 200
 
 Say = Callable[[str], None]
@@ -92,8 +94,7 @@ def search(
     Raises:
         InputError: even the lowest amplitude allows no BLA or exceeds a limit.
     """
-    if not 0 < lowest_rad < highest_rad:
-        raise InputError("The lowest amplitude must be above zero and below the highest one.")
+    _refuse_range(lowest_rad, highest_rad)
     rig = _Levels(campaign, bench, limits or Limits(), say)
     amplitude, ended_by = lowest_rad, ""
     while not ended_by:
@@ -106,6 +107,22 @@ def search(
     rig.reach_limits()
     rig.refine()
     return evaluate(sorted(rig.levels.items()), ended_by)
+
+
+def most_levels(lowest_rad: float, highest_rad: float) -> int:
+    """Return how many amplitudes `search` measures at the most.
+
+    Raises:
+        InputError: no range.
+    """
+    _refuse_range(lowest_rad, highest_rad)
+    steps = int(math.log(highest_rad / lowest_rad) / math.log(STEP) + 1e-9)
+    return steps + 1 + EXTRA
+
+
+def _refuse_range(lowest_rad: float, highest_rad: float) -> None:
+    if not 0 < lowest_rad < highest_rad:
+        raise InputError("The lowest amplitude must be above zero and below the highest one.")
 
 
 class _Levels:

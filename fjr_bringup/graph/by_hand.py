@@ -15,7 +15,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import Trigger
 
-from fjr_interface.topics import NAMESPACE, NODES, WRITERS
+from fjr_interface.topics import NAMESPACE, NODES, WRITERS, checked_namespace
 from fjr_interface.waiting import start
 from fjr_kit.errors import InputError
 
@@ -32,11 +32,15 @@ _LEVELS = ("ok", "WARN", "ERROR", "stale")
 class Rig:
     """The nodes of the ROS domain that the environment names; a context manager."""
 
+    def __init__(self, namespace: str = NAMESPACE) -> None:
+        """Prepare to talk to the nodes in a namespace; raise InputError if it is none."""
+        self._namespace = checked_namespace(namespace)
+
     def __enter__(self) -> Rig:
         """Join the domain; raise InputError if the environment names none."""
         own_domain()
         rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
-        self._node = rclpy.create_node(f"fjr_{os.getpid()}", namespace=NAMESPACE)
+        self._node = rclpy.create_node(f"fjr_{os.getpid()}", namespace=self._namespace)
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self._node)
         return self
@@ -98,12 +102,12 @@ class Rig:
 
     def _absence(self, node: str) -> str:
         """Return what is known of a node of the rig that says nothing."""
-        topic = f"{NAMESPACE}/{WRITERS[node].topic}"
+        topic = f"{self._namespace}/{WRITERS[node].topic}"
         writers = {
             f"{each.node_namespace.rstrip('/')}/{each.node_name}"
             for each in self._node.get_publishers_info_by_topic(topic)
         }
-        if f"{NAMESPACE}/{node}" in writers:
+        if f"{self._namespace}/{node}" in writers:
             silent = "it says nothing: it hangs, or it was killed a moment ago"
             return f"{node}: SILENT, {silent}; end it, {start(node)}, then `fjr reset`"
         if writers:
@@ -113,10 +117,11 @@ class Rig:
     def _diagnostics(self) -> list[DiagnosticStatus]:
         """Return the newest diagnostics of every node of the rig, by name."""
         heard: dict[str, DiagnosticStatus] = {}
+        ours = self._namespace[1:]
 
         def hear(message: DiagnosticArray) -> None:
             statuses = {status.name: status for status in message.status}
-            heard.update({k: v for k, v in statuses.items() if k.startswith(f"{NAMESPACE[1:]}/")})
+            heard.update({k: v for k, v in statuses.items() if _namespace(k) == ours})
 
         subscription = self._node.create_subscription(DiagnosticArray, "/diagnostics", hear, 10)
         until = time.monotonic() + _FIND_S
@@ -135,14 +140,14 @@ class Rig:
         """
         nodes = set(map(_node, heard))
         writers = self._node.get_publishers_info_by_topic("/diagnostics")
-        found = sum(writer.node_namespace == NAMESPACE for writer in writers)
+        found = sum(writer.node_namespace == self._namespace for writer in writers)
         return nodes >= set(NODES) and found <= len(heard)
 
     def _not_found(self, what: str) -> str:
         domain = os.environ.get("ROS_DOMAIN_ID") or "0"
         return (
-            f"No rig is found in ROS domain {domain} ({what}; {reach()}); start its nodes, or set "
-            "ROS_DOMAIN_ID to their domain."
+            f"No rig is found in ROS domain {domain}, namespace {self._namespace} ({what}; "
+            f"{reach()}); start its nodes, or set ROS_DOMAIN_ID or FJR_NAMESPACE to theirs."
         )
 
     def _call(self, kind: Any, service: str, request: Any, *, once: bool = False) -> Any:
@@ -178,6 +183,11 @@ def _message(answer: Trigger.Response) -> str:
 def _sentence(text: str) -> str:
     """Return a refusal as a sentence."""
     return text if text.endswith(".") else f"It refuses: {text}."
+
+
+def _namespace(status_name: str) -> str:
+    """Return the namespace, without its slash, of the node that a diagnostic status is of."""
+    return status_name.split(":")[0].rpartition("/")[0]
 
 
 def _node(status_name: str) -> str:

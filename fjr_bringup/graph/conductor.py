@@ -17,7 +17,7 @@ from std_srvs.srv import Trigger
 
 from fjr_interface.bags.folder_names import bag_folder
 from fjr_interface.experiment import Experiment
-from fjr_interface.topics import NAMESPACE, NODES, SIGNALS
+from fjr_interface.topics import NAMESPACE, NODES, SIGNALS, Signal
 from fjr_kit.errors import InputError
 from fjr_kit.processes import ProcessGroup
 from fjr_kit.stopping import Interruption
@@ -43,14 +43,15 @@ class Conductor:
         interruption: Interruption,
         nodes: Iterable[str] = tuple(NODES),
         recorder: Callable[[Node], Recorder] = Recorder,
+        namespace: str = NAMESPACE,
     ) -> None:
-        """Join the graph; the processes of these nodes have been started."""
+        """Join the graph; the processes of these nodes have been started in the namespace."""
         self._processes = processes
         self._nodes = tuple(nodes)
         self._interruption = interruption
         rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
-        self._node = rclpy.create_node("campaign", namespace=NAMESPACE)
-        self._recorder_node = rclpy.create_node("recorder", namespace=NAMESPACE)
+        self._node = rclpy.create_node("campaign", namespace=namespace)
+        self._recorder_node = rclpy.create_node("recorder", namespace=namespace)
         self._recorder = recorder(self._recorder_node)
         self._said_still = False
         self._executor = SingleThreadedExecutor()
@@ -110,9 +111,12 @@ class Conductor:
             if len(writers) > 1:
                 names = ", ".join(f"{each.node_namespace}/{each.node_name}" for each in writers)
                 raise InputError(
-                    f"Several nodes publish on {signal.absolute_topic} ({names}); stop the others "
+                    f"Several nodes publish on {self._topic(signal)} ({names}); stop the others "
                     "or set another ROS_DOMAIN_ID."
                 )
+
+    def _topic(self, signal: Signal) -> str:
+        return str(self._node.resolve_topic_name(signal.topic))
 
     def _wait_a_moment(self, until: float, suspect: str) -> None:
         self._executor.spin_once(timeout_sec=_POLL_S)

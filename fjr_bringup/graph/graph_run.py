@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from fjr_interface.parameter_file import save_parameter_file
-from fjr_interface.topics import NODES
+from fjr_interface.topics import NAMESPACE, NODES
 from fjr_kit.processes import ProcessGroup
 from fjr_kit.stopping import Interruption
 
@@ -78,16 +78,24 @@ def run_campaign(
             return bags
 
 
-def save_roles(logs: Path, roles: Mapping[str, Mapping[str, Any]]) -> Path:
+def save_roles(
+    logs: Path, roles: Mapping[str, Mapping[str, Any]], namespace: str = NAMESPACE
+) -> Path:
     """Write how the nodes play their parts, {node: {parameter: value}}; return the file."""
     file = logs / "roles.yaml"
-    save_parameter_file(file, roles)
+    save_parameter_file(file, roles, namespace=namespace)
     return file
 
 
-def ros_arguments(files: Sequence[Path]) -> list[str]:
-    """Return the ROS arguments that make a node read parameter files, of which later ones win."""
-    return [word for file in files for word in ("--params-file", str(file))]
+def ros_arguments(files: Sequence[Path], namespace: str = NAMESPACE) -> list[str]:
+    """Return the ROS arguments that make a node read parameter files, of which later ones win.
+
+    Args:
+        files: with the node in the namespace.
+        namespace: where the node is to be.
+    """
+    words = [word for file in files for word in ("--params-file", str(file))]
+    return words if namespace == NAMESPACE else [*words, "-r", f"__ns:={namespace}"]
 
 
 def start_nodes(

@@ -15,7 +15,7 @@ from std_srvs.srv import Trigger
 from fjr_interface.bags.folder_names import bag_folder
 from fjr_interface.bags.writer import BagWriter, keep_whole_periods
 from fjr_interface.experiment import Experiment
-from fjr_interface.topics import NAMESPACE, stamp_ns
+from fjr_interface.topics import NAMESPACE, checked_namespace, stamp_ns
 from fjr_kit.errors import InputError
 from fjr_kit.stopping import Interruption
 
@@ -110,7 +110,11 @@ class HandRecorder(Recorder):
 
 
 def record_by_hand(
-    out: Path, count: int, progress: CampaignProgress, recorded: Callable[[Path], None]
+    out: Path,
+    count: int,
+    progress: CampaignProgress,
+    recorded: Callable[[Path], None],
+    namespace: str = NAMESPACE,
 ) -> None:
     """Record realizations of the rig in the ROS domain of the environment.
 
@@ -119,23 +123,24 @@ def record_by_hand(
         count: how many realizations.
         progress: where progress is shown.
         recorded: called with every bag when it lies, audited, in its place.
+        namespace: where the rig is.
 
     Raises:
-        InputError: the environment names no domain, a sample was lost, the controller has tripped,
-            or the folder cannot be written.
+        InputError: no namespace, the environment names no domain, a sample was lost, the
+            controller has tripped, or the folder cannot be written.
         KeyboardInterrupt: Ctrl-C; the whole periods of the realization under way are kept.
     """
-    domain = own_domain()
+    domain, namespace = own_domain(), checked_namespace(namespace)
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     try:
-        node = rclpy.create_node("recorder", namespace=NAMESPACE)
+        node = rclpy.create_node("recorder", namespace=namespace)
         recorder = HandRecorder(node)
         progress.say(f"Recording in ROS domain {domain}; {reach()}.")
         with Interruption() as interruption:
             try:
                 for _ in range(count):
                     _record_one(recorder, out, progress, interruption)
-                    _refuse_trip(recorder)
+                    _refuse_trip(recorder, namespace)
                     bag = bag_folder(
                         out, recorder.experiment.level, recorder.experiment.realization
                     )
@@ -181,16 +186,16 @@ def _waits_for(recorder: HandRecorder) -> str:
     if topic := recorder.unwritten:
         return f"Waiting for a publisher of {topic}."
     if not recorder.described:
-        return "Waiting for the description of a realization on /rig/experiment."
+        return f"Waiting for the description of a realization on {recorder.description_topic}."
     if recorder.samples:
         return f"Sample {recorder.samples + 1} does not come; `fjr status` says who is missing."
     begun = "" if recorder.late else "if the realization has begun, "
     return f"Waiting for the first sample; {begun}`fjr reset` plays it from its beginning."
 
 
-def _refuse_trip(recorder: HandRecorder) -> None:
+def _refuse_trip(recorder: HandRecorder, namespace: str) -> None:
     """Refuse a realization in which the controller held the torque at zero."""
-    node: Node = rclpy.create_node("record_client", namespace=NAMESPACE)
+    node: Node = rclpy.create_node("record_client", namespace=namespace)
     executor = SingleThreadedExecutor()
     executor.add_node(node)
     client = node.create_client(Trigger, "controller/status")

@@ -1,4 +1,4 @@
-"""What the launch files ask of the rig before they start anything (no ROS, no launch here)."""
+"""What launch files ask before they start anything, and files for nodes in another namespace."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import tempfile
 from pathlib import Path
 
 from fjr_interface.parameter_file import load_parameter_file, save_parameter_file
-from fjr_interface.topics import NAMESPACE
+from fjr_interface.topics import NAMESPACE, checked_namespace, moved_topic
 
 
 def checked_rig(file: str, namespace: str = NAMESPACE) -> str:
@@ -21,11 +21,29 @@ def checked_rig(file: str, namespace: str = NAMESPACE) -> str:
         that namespace.
 
     Raises:
-        InputError: no such file, or one that names other nodes. The nodes check the values.
+        InputError: no such file, one that names other nodes, or no namespace. The nodes check the
+            values.
     """
-    values = load_parameter_file(file)
-    if f"/{namespace.strip('/')}" == NAMESPACE:
+    namespace = checked_namespace(namespace)
+    if namespace == NAMESPACE:
+        load_parameter_file(file)
+        return file
+    return str(moved_file(Path(file), namespace, Path(tempfile.mkdtemp(prefix="fjr-launch-"))))
+
+
+def recorder_qos(file: str, namespace: str) -> str:
+    """Return a file of rosbag2's QoS overrides, written for topics in `/rig`, for a namespace."""
+    if (namespace := checked_namespace(namespace)) == NAMESPACE:
         return file
     moved = Path(tempfile.mkdtemp(prefix="fjr-launch-")) / Path(file).name
-    save_parameter_file(moved, values, namespace=f"/{namespace.strip('/')}")
+    lines = Path(file).read_text(encoding="utf-8").splitlines(keepends=True)
+    moved.write_text("".join(moved_topic(line, namespace) for line in lines), encoding="utf-8")
     return str(moved)
+
+
+def moved_file(file: Path, namespace: str, folder: Path) -> Path:
+    """Return a copy, in a folder, of a parameter file, with its nodes in a namespace."""
+    values = load_parameter_file(file)
+    moved = folder / file.name
+    save_parameter_file(moved, values, namespace=namespace)
+    return moved

@@ -59,6 +59,11 @@ class Recorder:
         return None
 
     @property
+    def description_topic(self) -> str:
+        """Where the realization's description comes."""
+        return str(self._descriptions.topic_name)
+
+    @property
     def described(self) -> bool:
         """Whether the realization's description has arrived."""
         return self._writer is not None

@@ -86,10 +86,14 @@ class RehearsalConductor(Conductor):
     _recorder: RehearsalRecorder
 
     def __init__(
-        self, processes: ProcessGroup, interruption: Interruption, nodes: Iterable[str]
+        self,
+        processes: ProcessGroup,
+        interruption: Interruption,
+        nodes: Iterable[str],
+        namespace: str,
     ) -> None:
-        """Join the graph; the processes of these nodes have been started."""
-        super().__init__(processes, interruption, nodes, RehearsalRecorder)
+        """Join the graph; the processes of these nodes have been started in the namespace."""
+        super().__init__(processes, interruption, nodes, RehearsalRecorder, namespace)
         self._killed_ns: int | None = None
         self._restarted = False
         self._set_simulator = self._node.create_client(
@@ -126,10 +130,10 @@ class RehearsalConductor(Conductor):
     def _missing_of_drive(self) -> str | None:
         node = self._node
         if not node.count_publishers(MOTOR_POSITION.topic):
-            return f"nobody publishes {MOTOR_POSITION.absolute_topic}"
+            return f"nobody publishes {self._topic(MOTOR_POSITION)}"
         readers = node.get_subscriptions_info_by_topic(MOTOR_TORQUE.topic)
         if all(reader.node_name == self._recorder_node.get_name() for reader in readers):
-            return f"nobody subscribes to {MOTOR_TORQUE.absolute_topic}"
+            return f"nobody subscribes to {self._topic(MOTOR_TORQUE)}"
         return None
 
     def observe(

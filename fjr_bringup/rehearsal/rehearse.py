@@ -16,7 +16,7 @@ from bla_analyzer.output import provenance
 from fjr_interface.bags.folder_names import bag_folder
 from fjr_interface.experiment import Experiment
 from fjr_interface.ros import fast_dds
-from fjr_interface.topics import NODES
+from fjr_interface.topics import NAMESPACE, NODES
 from fjr_kit.atomic import write_whole
 from fjr_kit.check import Check
 from fjr_kit.folder_lock import locked_folder
@@ -28,6 +28,7 @@ from fjr_sim_node.simulation.simulator import run_realization
 from ..campaign.plan import CAMPAIGN_FILE
 from ..graph.domain import claimed_domain, reach
 from ..graph.graph_run import ros_arguments, save_roles
+from ..graph.launching import moved_file
 from .limits import judge, limit_check
 from .loop_progress import RehearsalProgress
 from .prediction import predict
@@ -85,13 +86,18 @@ class Graph:
         """Start the processes and wait until all are there."""
         plan = self._plan
         self._logs.mkdir()
-        files = [plan.folder / CAMPAIGN_FILE, save_roles(self._logs, plan.roles)]
-        self._arguments = ros_arguments(files)
+        campaign, namespace = plan.folder / CAMPAIGN_FILE, plan.options.namespace
+        if namespace != NAMESPACE:
+            campaign = moved_file(campaign, namespace, self._logs)
+        files = [campaign, save_roles(self._logs, plan.roles, namespace)]
+        self._arguments = ros_arguments(files, namespace)
         with ExitStack() as stack:
             self._processes = stack.enter_context(ProcessGroup())
             for node in plan.nodes:
                 self._start(node)
-            self._conductor = RehearsalConductor(self._processes, self._interruption, plan.nodes)
+            self._conductor = RehearsalConductor(
+                self._processes, self._interruption, plan.nodes, namespace
+            )
             stack.enter_context(self._conductor)
             if plan.options.drive == EXTERNAL:
                 self._conductor.wait_for_drive(self._progress.say)

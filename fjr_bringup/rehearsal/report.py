@@ -64,7 +64,8 @@ def _lead(rehearsal: Rehearsal) -> str:
         f"{rehearsal.ended}."
     )
     if rehearsal.fault:
-        lead += f" Fault rehearsed: {json.dumps(dict(rehearsal.fault))}."
+        words = ", ".join(f"{name} {value}" for name, value in rehearsal.fault.items())
+        lead += f" Fault rehearsed: {words}."
     return lead
 
 

@@ -15,7 +15,7 @@ from controller_node.node import PARAMETERS as CONTROLLER
 from excitation_node.node import PARAMETERS as EXCITATION
 from fjr_interface.experiment import Experiment
 from fjr_interface.real_time import REAL_TIME
-from fjr_interface.topics import NODES
+from fjr_interface.topics import NAMESPACE, NODES, checked_namespace
 from fjr_kit.errors import InputError
 from fjr_sim_node.drive.faults import NODE, FaultPlan, as_text
 
@@ -46,6 +46,7 @@ class Options:
         hardware: whether an external drive moves hardware; None if it was not said.
         confirm: name of the joint that the user says is going to move.
         network: whether discovery may leave this machine.
+        namespace: where the nodes and their topics are.
         overrides: {node: {parameter: value}} that win over the rig file.
         command: the command line, for the report.
     """
@@ -61,6 +62,7 @@ class Options:
     hardware: bool | None = None
     confirm: str | None = None
     network: bool = False
+    namespace: str = NAMESPACE
     overrides: Mapping[str, Mapping[str, Any]] = dataclasses.field(default_factory=dict)
     command: str | None = None
 
@@ -164,6 +166,7 @@ def check_options(options: Options) -> Plan:
     """
     limits = LimitsFile.load(options.limits)
     _check_drive(options)
+    options = dataclasses.replace(options, namespace=checked_namespace(options.namespace))
     controller = _controller(options, limits)
     source = f"{options.limits}: controller" if options.limits else ""
     check_hardware(CONTROLLER.check(controller, source))

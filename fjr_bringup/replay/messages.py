@@ -36,6 +36,7 @@ from fjr_interface.topics import (
     MOTOR_TORQUE,
     NAMESPACE,
     REFERENCE,
+    moved_topic,
 )
 from fjr_kit.errors import InputError
 
@@ -90,17 +91,18 @@ class Messages:
         duration_s: time that the recording took.
     """
 
-    def __init__(self, bag: Path, wanted: Sequence[str] = ()) -> None:
+    def __init__(self, bag: Path, wanted: Sequence[str] = (), namespace: str = NAMESPACE) -> None:
         """Open the bag.
 
         Args:
             bag: its folder.
             wanted: topics by name or by last words; empty for all. The description always comes.
+            namespace: where the topics go that the bag has in `/rig`.
 
         Raises:
             InputError: the bag cannot be read, or holds no such topic.
         """
-        self._bag = bag
+        self._bag, self._namespace = bag, namespace
         self._files = bag_files(bag)
         self._files.refuse_cut()
         self.notes = list(self._files.notes)
@@ -150,7 +152,8 @@ class Messages:
             if each.name == topic.name
             for qos in self._offered(each)
         ]
-        self._played[topic.name] = PlayedTopic(topic.name, kind, to_offer(offers))
+        place = moved_topic(topic.name, self._namespace)
+        self._played[topic.name] = PlayedTopic(place, kind, to_offer(offers))
 
     def _offered(self, topic: TopicMetadata) -> list[Qos]:
         profiles = topic.offered_qos_profiles
@@ -168,7 +171,8 @@ class Messages:
             _means(EXPERIMENT_TOPIC, name) for name in self._played
         ):
             return None
-        topic = PlayedTopic(f"{NAMESPACE}/{EXPERIMENT_TOPIC}", String, runtime.EXPERIMENT_QOS)
+        place = f"{self._namespace}/{EXPERIMENT_TOPIC}"
+        topic = PlayedTopic(place, String, runtime.EXPERIMENT_QOS)
         self._played[topic.name] = topic
         return TimedMessage(topic, serialize_message(String(data=text)), 0, -1, 0.0)
 

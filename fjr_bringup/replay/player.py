@@ -17,7 +17,7 @@ from rclpy.signals import SignalHandlerOptions
 from rosgraph_msgs.msg import Clock
 
 from fjr_interface.ros import runtime
-from fjr_interface.topics import NAMESPACE, clock_message, clock_ns
+from fjr_interface.topics import checked_namespace, clock_message, clock_ns
 from fjr_kit.errors import InputError
 from fjr_kit.stopping import Interruption
 
@@ -46,15 +46,17 @@ def publish_bag(bag: Path, publishing: Publishing, sum_up: Callable[[Published],
         sum_up: told at the end, and at Ctrl-C, what was published.
 
     Raises:
-        InputError: the bag cannot be read, a topic is not in it, or somebody else publishes one.
+        InputError: the bag cannot be read, a topic is not in it, no namespace, or somebody else
+            publishes one.
         KeyboardInterrupt: Ctrl-C; what was published until then was summed up.
     """
     own_domain()  # refused by a sentence, unlike by rclpy
-    messages = Messages(bag, publishing.topics)
+    namespace = checked_namespace(publishing.namespace)
+    messages = Messages(bag, publishing.topics, namespace)
     with Interruption() as interruption:
         rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
         try:
-            node = rclpy.create_node(NODE, namespace=NAMESPACE, start_parameter_services=False)
+            node = rclpy.create_node(NODE, namespace=namespace, start_parameter_services=False)
             player = Player(node, messages, publishing, interruption)
             player.wait()
             try:
@@ -204,7 +206,7 @@ class Player:
             writers = self._node.get_publishers_info_by_topic(name)
             if len(writers) > 1:
                 names = {f"{each.node_namespace.rstrip('/')}/{each.node_name}" for each in writers}
-                others = names - {f"{NAMESPACE}/{NODE}"} or names
+                others = names - {self._node.get_fully_qualified_name()} or names
                 raise InputError(
                     f"{', '.join(sorted(others))} publishes on {name} too; stop it, choose other "
                     "topics with --topic, or set another ROS_DOMAIN_ID."

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from fjr_interface.topics import NAMESPACE
+
 
 @dataclass(frozen=True)
 class Publishing:
@@ -16,6 +18,7 @@ class Publishing:
         loop: whether it begins again at the end.
         wait_for: nodes that must read one of the topics before it begins.
         follow_clock: whether another program's /clock keeps the time, instead of this machine's.
+        namespace: where the topics go that the bag has in `/rig`.
     """
 
     rate: float = 1.0
@@ -24,6 +27,7 @@ class Publishing:
     loop: bool = False
     wait_for: tuple[str, ...] = ()
     follow_clock: bool = False
+    namespace: str = NAMESPACE
 
 
 @dataclass(frozen=True)

@@ -116,11 +116,8 @@ class BlindCheck:
             InputError: the folder holds another check, one that was begun on another machine, or
                 one whose frozen sources have changed.
         """
-        check_methods(methods)
-        if (folder / "blind.json").exists():
-            return cls.open(folder)._as_ordered(cases, seed, methods)
-        if folder.exists() and any(folder.iterdir()):
-            raise InputError(f"{folder} holds something else; choose another folder.")
+        if (there := cls.ordered(folder, cases, seed, methods)) is not None:
+            return there
         begun = Manifest(
             check=secrets.token_hex(8),
             cases=dict(cases),
@@ -132,6 +129,22 @@ class BlindCheck:
         folder.mkdir(parents=True, exist_ok=True)
         write_whole(folder / "blind.json", begun.to_json())
         return cls(folder, begun)
+
+    @classmethod
+    def ordered(
+        cls, folder: Path, cases: Mapping[str, int], seed: int | None, methods: Sequence[str]
+    ) -> BlindCheck | None:
+        """Return the check in the folder, None if there is none and one may be begun there.
+
+        Raises:
+            InputError: as `begin`.
+        """
+        check_methods(methods)
+        if (folder / "blind.json").exists():
+            return cls.open(folder)._as_ordered(cases, seed, methods)
+        if folder.exists() and any(folder.iterdir()):
+            raise InputError(f"{folder} holds something else; choose another folder.")
+        return None
 
     @classmethod
     def open(cls, folder: Path) -> BlindCheck:

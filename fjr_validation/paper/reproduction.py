@@ -110,6 +110,14 @@ def compute(
 
     results = stage(fig4.tasks(settings), "amplitude sweep")
     amplitude_rad = fig4.optimum_amplitude(results, settings)
+    results |= stage(further_tasks(settings, amplitude_rad), "experiments")
+    results |= stage(fig5.torque_tasks(settings, results), "shaped experiments")
+    results |= stage(fig5.best_tasks(settings, results), "shaped, repeated")
+    return results, amplitude_rad
+
+
+def further_tasks(settings: Settings, amplitude_rad: float) -> list[Task]:
+    """Return the tasks that need the best amplitude (rad) and nothing else."""
     further: list[Task] = []
     for module in (
         fig5,
@@ -122,10 +130,7 @@ def compute(
         leakage,
     ):
         further += module.tasks(settings, amplitude_rad)
-    results |= stage(further, "experiments")
-    results |= stage(fig5.torque_tasks(settings, results), "shaped experiments")
-    results |= stage(fig5.best_tasks(settings, results), "shaped, repeated")
-    return results, amplitude_rad
+    return further
 
 
 def build(settings: Settings, results: dict[str, Arrays], amplitude_rad: float) -> list[Part]:

@@ -51,6 +51,14 @@ def test_no_page_loads_anything_from_elsewhere(site: Path):
         assert "//fonts." not in style.read_text(encoding="utf-8"), style
 
 
+def test_a_page_opened_from_the_folder_can_search(site: Path):
+    """A browser gives it neither a file that it asks for nor a worker: both are scripts."""
+    assert (site / "search/search_index.js").read_text(encoding="utf-8").startswith("var __index")
+    for page, script in (("index", "scripts"), ("tutorials/gap", "../scripts")):
+        text = (site / f"{page}.html").read_text(encoding="utf-8")
+        assert f'<script src="{script}/iframe-worker.js"></script>' in text
+
+
 def test_every_command_and_option_is_in_the_reference(site: Path):
     page = (site / "reference/commands.html").read_text(encoding="utf-8")
     commands = dict(typer.main.get_command(app).commands)  # type: ignore[attr-defined]
@@ -72,5 +80,5 @@ def test_the_api_has_every_public_name(site: Path):
 
 def test_the_glossary_has_every_term(site: Path):
     page = (site / "glossary.html").read_text(encoding="utf-8")
-    terms = ("BLA", "Level", "Realization", "V", "G0", "Disc", "M, P", "Gap", "Remainder")
+    terms = ("BLA", "Level", "Realization", "V", "G0", "Disc", "M", "P", "Gap", "Remainder")
     assert [term for term in terms if f"<strong>{term}.</strong>" not in page] == []

@@ -105,7 +105,8 @@ def test_an_emergency_stop_holds_zero_torque_until_it_is_released(start, rig):
 @pytest.mark.parametrize("command", ["status", "estop"])
 def test_where_no_rig_is_one_sentence_says_so(start, domain, command):
     output = fjr(start, command, status=2)
-    assert output.startswith(f"No rig is found in ROS domain {domain} (") and "\n" not in output
+    begin = f"No rig is found in ROS domain {domain}, namespace /rig ("
+    assert output.startswith(begin) and "\n" not in output
 
 
 def test_a_domain_that_is_none_is_refused(start, monkeypatch):

@@ -20,12 +20,14 @@ from fjr_sim_node.simulation.simulator import SIMULATOR, run_realization
 BAG = "level_0_realization_000"
 
 
-def rig(start, speed: float | str = ".inf", **excitation: Any) -> None:
+def rig(
+    start, speed: float | str = ".inf", namespace: str | None = None, **excitation: Any
+) -> None:
     """Start the nodes so that the recorder misses no first sample and none that follows."""
-    start.node("fjr_sim_node", speed=speed, readers="controller,recorder")
-    start.node("controller_node", readers="simulator,recorder")
+    start.node("fjr_sim_node", namespace=namespace, speed=speed, readers="controller,recorder")
+    start.node("controller_node", namespace=namespace, readers="simulator,recorder")
     paced = {"readers": "controller,recorder", "pace": "recorded"}
-    start.node("excitation_node", **EXCITATION, **excitation, **paced)
+    start.node("excitation_node", namespace=namespace, **EXCITATION, **excitation, **paced)
 
 
 def test_a_rig_by_hand_is_recorded_sample_for_sample(start, domain: int, tmp_path: Path):
@@ -41,6 +43,25 @@ def test_a_rig_by_hand_is_recorded_sample_for_sample(start, domain: int, tmp_pat
     )
     again = start("fjr_cli", "record", "--out", str(tmp_path / "rig"))
     assert again.exit_status() == 2 and f"{BAG}: exists already" in again.output
+
+
+def test_two_rigs_of_one_domain_are_told_apart_by_their_namespaces(
+    start, domain: int, tmp_path: Path
+):
+    """The bag of one in another namespace is that of any: its topics lie in /rig."""
+    recorder = start("fjr_cli", "record", "--out", str(tmp_path / "cell"), "--namespace", "/cell/a")
+    recorder.wait_for_text("Waiting for a publisher of /cell/a/")
+    rig(start, namespace="/cell/a", periods=2)
+    start.node("controller_node")
+    assert recorder.exit_status() == 0, recorder.output
+    record = read_record(tmp_path / "cell" / BAG)
+    expected = run_realization(SIMULATOR.defaults(), described(periods=2))
+    np.testing.assert_array_equal(record.torque, expected.torque)
+    told = fjr(start, "status", "--namespace", "cell/a")
+    assert told.count("level 0, realization 0") >= 2 and "MISSING" not in told, told
+    assert "simulator: MISSING, nobody publishes /rig/motor_position" in fjr(start, "status")
+    refused = fjr(start, "pause", "--namespace", "/my-cell", status=2)
+    assert refused.startswith("'/my-cell' is no ROS namespace: write words of letters")
 
 
 def test_ctrl_c_keeps_whole_periods_and_a_late_recorder_waits(start, domain: int, tmp_path: Path):

@@ -100,6 +100,12 @@ def test_report_shows_the_verdict_and_escapes_what_is_not_ours():
         assert sum(y for y in share if y is not None) == pytest.approx(1.0)
 
 
+def test_the_report_says_the_fault_in_words():
+    fault = {"kind": "node_killed", "node": "controller", "after_s": 1.0}
+    text = render(rehearsal().model_copy(update={"fault": fault}), {})
+    assert "Fault rehearsed: kind node_killed, node controller, after_s 1.0." in text
+
+
 def test_no_text_of_a_rehearsal_can_become_code():
     hostile = {"reach": EVIL, "ended": EVIL, "bag_damage": EVIL, "drive": EVIL}
     machine = BUSY.model_copy(update={"nodes": {EVIL: PLAIN.model_copy(update={"policy": EVIL})}})

@@ -44,15 +44,20 @@ def calm(tmp_path: Path) -> Path:
     return file
 
 
-def test_an_external_drive_is_waited_for_and_ends_in_go(domain, mark, tmp_path, start, calm):
+@pytest.mark.parametrize("namespace", ["/rig", "/cell/left"])
+def test_an_external_drive_is_waited_for_and_ends_in_go(
+    domain, mark, tmp_path, start, calm, namespace
+):
     """The drive of somebody else is a simulator that somebody else starts."""
     out = tmp_path / "out"
     rehearsal = start(
         "fjr_cli", "rehearse", "--drive", "external", "--no-hardware", "--rate", "200",
-        "--duration", "1.5", "--limits", str(calm), "--out", str(out), *SETTINGS,
+        "--duration", "1.5", "--limits", str(calm), "--out", str(out), "--namespace", namespace,
+        *SETTINGS,
     )  # fmt: skip
-    rehearsal.wait_for_text("Waiting for a drive: nobody publishes /rig/motor_position.")
-    drive = start.node("fjr_sim_node", mode="realtime", sample_rate_hz=200.0)
+    rehearsal.wait_for_text(f"Waiting for a drive: nobody publishes {namespace}/motor_position.")
+    real_time = {"mode": "realtime", "sample_rate_hz": 200.0}
+    drive = start.node("fjr_sim_node", namespace=namespace, **real_time)
     assert rehearsal.exit_status() == 0, rehearsal.output
     assert "GO: all" in rehearsal.output
     assert rehearsal.output.splitlines()[-1] == str(out / "report.html")

@@ -155,6 +155,23 @@ def test_a_foreign_bag_keeps_its_qos_and_gets_description_and_clock(start, peer,
     assert (note in replayed.output) != ("/marker" in table(replayed.output))
 
 
+def test_another_namespace_gets_what_the_bag_has_in_that_of_the_rig(start, peer, tmp_path):
+    from sensor_msgs.msg import JointState
+    from std_msgs.msg import String
+
+    from fjr_interface.ros import runtime
+
+    write_bag(tmp_path / "bag", experiment())
+    ears = Ears(peer)
+    torque = peer.listen(JointState, "/cell/motor_torque", runtime.SIGNAL_QOS)
+    told = peer.listen(String, "/cell/experiment", runtime.EXPERIMENT_QOS)
+    replayed = replay(start, tmp_path / "bag", "--namespace", "/cell")
+    assert ears.hear_out(replayed) == 0, replayed.output
+    peer.spin_until(lambda: len(torque) == 60, "all torques")
+    assert Experiment.from_json(told[0].data, "topic") == experiment()
+    assert len(ears.ticks) > 0 and not any(ears.signals.values()) and not ears.experiment
+
+
 def test_a_reader_that_is_wanted_is_waited_for_by_name(start, peer, tmp_path):
     write_bag(tmp_path / "bag", experiment())
     replayed = start("fjr_cli", "replay", str(tmp_path / "bag"), "--wait-for", "peer")

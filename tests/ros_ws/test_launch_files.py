@@ -71,6 +71,9 @@ class ParameterValue:
 class PathJoinSubstitution:
     substitutions: list[Any]
 
+    def perform(self, context: Launch) -> str:
+        return context.text(self)
+
 
 @dataclass
 class FindPackageShare:
@@ -242,6 +245,8 @@ def test_a_file_that_is_not_there_is_refused(monkeypatch: pytest.MonkeyPatch) ->
         file = folder("fjr_bringup") / f"launch/{name}.launch.py"
         with pytest.raises(InputError, match=r"no_such\.yaml: cannot be read"):
             Launch(file, monkeypatch, {"rig": "no_such.yaml"})
+        with pytest.raises(InputError, match="'/my-cell' is no ROS namespace"):
+            Launch(file, monkeypatch, {"namespace": "/my-cell"})
 
 
 def test_whatever_ends_ends_all(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -264,14 +269,32 @@ def test_nodes_of_another_namespace_get_the_same_parameters(
         assert node.remappings == [("link_position", "/joint_states")]
 
 
+def test_rosbag2_records_the_topics_of_another_namespace(monkeypatch: pytest.MonkeyPatch) -> None:
+    launch = Launch(
+        folder("fjr_bringup") / "launch/rosbag2.launch.py", monkeypatch, {"namespace": "/cell"}
+    )
+    (record,) = launch.of(ExecuteProcess)
+    words = list(map(launch.text, record.cmd))
+    topics_recorded = words[words.index("--topics") + 1 :]
+    from ruamel.yaml import YAML
+
+    qos = YAML(typ="safe").load(Path(words[words.index("--qos-profile-overrides-path") + 1]))
+    assert set(qos) == set(topics_recorded) and "/cell/reference" in qos
+    assert len([topic for topic in topics_recorded if topic.startswith("/cell/")]) == 5
+    for node in launch.of(Node):
+        assert node.namespace == "/cell"
+        assert load_parameter_file(node.parameters[0], namespace="/cell")
+
+
 def test_options_that_were_given_reach_the_command(monkeypatch: pytest.MonkeyPatch) -> None:
     share = folder("fjr_cli") / "launch"
-    given = {"out": "report", "rate": "500", "duration": "5"}
+    given = {"out": "report", "rate": "500", "duration": "5", "namespace": "/cell"}
     (rehearse,) = Launch(share / "rehearsal.launch.py", monkeypatch, given).of(ExecuteProcess)
-    assert rehearse.cmd[4:] == ["--out", "report", "--rate", "500", "--duration", "5"]
-    given = {"rate": "2", "follow_clock": "true"}
+    words = ["--out", "report", "--rate", "500", "--duration", "5", "--namespace", "/cell"]
+    assert rehearse.cmd[4:] == words
+    given = {"rate": "2", "namespace": "/cell", "follow_clock": "true"}
     (replay,) = Launch(share / "replay.launch.py", monkeypatch, given).of(ExecuteProcess)
-    assert replay.cmd[3:] == ["--rate", "2", "--follow-clock"]
+    assert replay.cmd[3:] == ["--rate", "2", "--namespace", "/cell", "--follow-clock"]
 
 
 def test_the_description_of_the_rig_has_the_values_of_the_plant(

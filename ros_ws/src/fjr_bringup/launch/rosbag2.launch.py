@@ -19,41 +19,54 @@ READERS = {
 TOPICS = ("reference", "motor_position", "motor_torque", "link_position", "experiment")
 
 
-def start(context: LaunchContext) -> list[Node]:
-    """Check the parameter file, then return the nodes; the first that ends ends them all."""
-    from fjr_bringup.graph.launching import checked_rig
+def start(context: LaunchContext) -> list[Node | ExecuteProcess]:
+    """Check the parameter file, then return nodes and recorder; the first that ends ends all."""
+    from fjr_bringup.graph.launching import checked_rig, recorder_qos
 
-    rig = checked_rig(LaunchConfiguration("rig").perform(context))
-    return [
+    def given(name: str) -> str:
+        return LaunchConfiguration(name).perform(context)
+
+    rig = checked_rig(given("rig"), given("namespace"))
+    namespace = f"/{given('namespace').strip('/')}"
+    nodes = [
         Node(
             package=package,
             executable=package,
+            namespace=namespace,
             parameters=[rig, {"readers": f"{reader},{RECORDER}"}],
             output="screen",
             on_exit=[Shutdown(reason=f"{package} has ended")],
         )
         for package, reader in READERS.items()
     ]
-
-
-def generate_launch_description() -> LaunchDescription:
-    """Start excitation, controller, simulated drive and `ros2 bag record`."""
-    config = PathJoinSubstitution([FindPackageShare("fjr_bringup"), "config"])
-    rig = DeclareLaunchArgument(
-        "rig",
-        default_value=PathJoinSubstitution([config, "paper", "optimum.yaml"]),
-        description="Parameter file of rig and experiment",
-    )
-    out = DeclareLaunchArgument("out", description="Folder of the bag; it may not exist yet")
+    qos = PathJoinSubstitution([FindPackageShare("fjr_bringup"), "config", "rosbag2_qos.yaml"])
     record = ExecuteProcess(
         cmd=[
-            *("ros2", "bag", "record", "--storage", "mcap", "--output", LaunchConfiguration("out")),
-            "--qos-profile-overrides-path",
-            PathJoinSubstitution([config, "rosbag2_qos.yaml"]),
-            *("--topics", "/clock", *(f"/rig/{topic}" for topic in TOPICS)),
+            *("ros2", "bag", "record", "--storage", "mcap", "--output", given("out")),
+            *("--qos-profile-overrides-path", recorder_qos(qos.perform(context), namespace)),
+            *("--topics", "/clock", *(f"{namespace}/{topic}" for topic in TOPICS)),
         ],
         output="screen",
         sigterm_timeout="30",  # time to close the bag after Ctrl-C
         on_exit=[Shutdown(reason="the recorder has ended")],
     )
-    return LaunchDescription([rig, out, record, OpaqueFunction(function=start)])
+    return [record, *nodes]
+
+
+def generate_launch_description() -> LaunchDescription:
+    """Start excitation, controller, simulated drive and `ros2 bag record`."""
+    share = FindPackageShare("fjr_bringup")
+    return LaunchDescription(
+        [
+            DeclareLaunchArgument(
+                "rig",
+                default_value=PathJoinSubstitution([share, "config", "paper", "optimum.yaml"]),
+                description="Parameter file of rig and experiment",
+            ),
+            DeclareLaunchArgument("out", description="Folder of the bag; it may not exist yet"),
+            DeclareLaunchArgument(
+                "namespace", default_value="/rig", description="Namespace of nodes and topics"
+            ),
+            OpaqueFunction(function=start),
+        ]
+    )

@@ -5,7 +5,7 @@ from launch.actions import DeclareLaunchArgument, ExecuteProcess, OpaqueFunction
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
 from launch_ros.substitutions import ExecutableInPackage, FindPackageShare
 
-GIVEN = ("rig", "out", "rate", "duration")
+GIVEN = ("rig", "out", "rate", "duration", "namespace")
 
 
 def start(context: LaunchContext) -> list[ExecuteProcess]:
@@ -34,5 +34,8 @@ def generate_launch_description() -> LaunchDescription:
         DeclareLaunchArgument("out", default_value="", description="New folder of the report"),
         DeclareLaunchArgument("rate", default_value="", description="Samples per second"),
         DeclareLaunchArgument("duration", default_value="", description="Seconds to play"),
+        DeclareLaunchArgument(
+            "namespace", default_value="/rig", description="Namespace of nodes and topics"
+        ),
     ]
     return LaunchDescription([rig, *others, OpaqueFunction(function=start)])

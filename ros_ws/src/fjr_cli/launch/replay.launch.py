@@ -5,7 +5,7 @@ from launch.actions import DeclareLaunchArgument, ExecuteProcess, OpaqueFunction
 from launch.substitutions import LaunchConfiguration
 from launch_ros.substitutions import ExecutableInPackage
 
-GIVEN = ("rate", "into", "out")
+GIVEN = ("rate", "into", "out", "namespace")
 
 
 def start(context: LaunchContext) -> list[ExecuteProcess]:
@@ -31,6 +31,11 @@ def generate_launch_description() -> LaunchDescription:
                 "into", default_value="", description="closed-loop, plant or controller"
             ),
             DeclareLaunchArgument("out", default_value="", description="With into: new folder"),
+            DeclareLaunchArgument(
+                "namespace",
+                default_value="/rig",
+                description="Namespace of the topics that the bag has in /rig",
+            ),
             DeclareLaunchArgument(
                 "follow_clock",
                 default_value="false",
