@@ -6,7 +6,7 @@ import numpy as np
 
 from fjr_kit.check import Check
 from fjr_records.realization import FALSE_ALARM, Realization
-from fjr_records.units import FOLLOWING_LIMIT, following, unit_sentence
+from fjr_records.units import FOLLOWING_LIMIT, compare_units, following
 
 from .bla.robust import INPUT_VARIANCE_LIMIT
 from .results.result import BlaEstimate
@@ -115,10 +115,8 @@ def position_unit(realization: Realization, excited: np.ndarray) -> Check:
         value = float("nan")
         sentence = "without a reference the unit of y cannot be checked."
     else:
-        value = following(spectra.reference[excited], spectra.position[excited])
-        sentence = unit_sentence(value) or (
-            f"y is {value:.3g} times r at the lowest lines, as in one unit."
-        )
+        ratio = following(spectra.reference[excited], spectra.position[excited])
+        value, sentence = compare_units(ratio)
     return _check(realization, "position_unit", value, FOLLOWING_LIMIT, sentence)
 
 

@@ -13,7 +13,7 @@ from fjr_kit.errors import InputError
 from fjr_records.realization import TimeSignals
 from fjr_records.record_noise import stands_above_noise
 from fjr_records.records import Record, RecordSet
-from fjr_records.units import FOLLOWING_LIMIT, following, unit_sentence
+from fjr_records.units import FOLLOWING_LIMIT, compare_units, following
 
 from .bla.arbitrary import ArbitraryBla, arbitrary_bla, run_of
 from .bla.sensitivity import of_this_loop
@@ -242,7 +242,7 @@ def _checks(level: LevelResult, groups: Sequence[Sequence[Record]]) -> list[Chec
     made = [reliable_lines(level.level, level.bla)]
     lines = level.excited
     if all(_is_played(record.reference) for group in groups for record in group):
-        value = following(lines.reference, lines.position)
+        value, sentence = compare_units(following(lines.reference, lines.position))
         made.append(
             Check(
                 name="position_unit",
@@ -250,11 +250,7 @@ def _checks(level: LevelResult, groups: Sequence[Sequence[Record]]) -> list[Chec
                 passed=not value > FOLLOWING_LIMIT,
                 value=value,
                 limit=FOLLOWING_LIMIT,
-                sentence=f"level {level.level}: "
-                + (
-                    unit_sentence(value)
-                    or f"y is {value:.3g} times r at the lowest lines, as in one unit."
-                ),
+                sentence=f"level {level.level}: {sentence}",
             )
         )
     return made

@@ -227,7 +227,7 @@ class RealTimeController:
             self._miss_position()
             self._pacing = True
         while self.due_ns <= now_ns:
-            self._sample, self._said_ns = self._sample + 1, self.due_ns
+            self._sample, self._said_ns = self._sample + 1, now_ns
             answers.append((stamp_ns(self._sample, self._rate), self._law.rest()))
             self.due_ns = self.due_ns + round(self._period_ns) if self._watched else NEVER
         return answers

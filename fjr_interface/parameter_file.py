@@ -8,11 +8,12 @@ One file serves the nodes (`--params-file`) and `fjr run` / `fjr simulate`. So t
 same values, libyaml reads the YAML, as it does for rcl, scalars are typed by rcl's rules rather
 than YAML's (`1e-3` is a double, `010` is 8, `n` is false) and what rcl would refuse is refused
 here. Names may be nested and hold the wildcards `*` and `**`; where several entries name a node,
-the later one holds.
+the later one holds. What the file holds for nodes of other programs is passed over.
 """
 
 from __future__ import annotations
 
+import difflib
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -28,6 +29,7 @@ from .bounded_yaml import Loader, YamlProblem, bounded_events, yaml_problems
 from .parameters import ParameterGroup, nearest
 from .rcl_values import read_scalar, write_value
 from .topics import NAMESPACE
+from .topics import NODES as PROGRAMS
 
 NODES = ("excitation", "controller", "simulator")
 """Base names of the rig's nodes."""
@@ -38,6 +40,8 @@ MOST_CHARACTERS = 2**20
 NODES_OWN = frozenset(["joint", "readers", "use_sim_time", "start_type_description_service"])
 """Parameters that each node has beside its group."""
 
+_ALIKE = 0.8
+"""Likeness from which on a name is a misspelt one: simulater is, controller_manager is not."""
 _DEEPEST = 20
 """Most levels of a parameter file; libyaml takes long over thousands of brackets."""
 _MOST_DIRECTIVES = 10
@@ -66,21 +70,28 @@ def load_parameter_file(
         The values are not yet checked against descriptions: see `ParameterGroup.check`.
 
     Raises:
-        InputError: no such file, no YAML, another shape, an unknown node or none at all, a value
-            that rcl refuses, a wildcard's parameter that no node has.
+        InputError: no such file, no YAML, another shape, a name that is like that of a node or in
+            the rig's namespace, none of the nodes, a value that rcl refuses, a wildcard's parameter
+            that no node has.
     """
     root = _compose(_read(path), str(path))
     found: dict[str, dict[str, Any]] = {}
+    known = ", ".join(f"{namespace}/{node}" for node in nodes)
+    foreign = []
     for name, parameters in _nodes(path, root, "") if root is not None else ():
         matching = [node for node in nodes if _matches(name, f"{namespace}/{node}")]
+        if not matching and _is_foreign(name, namespace, nodes):
+            foreign.append(name)
+            continue
         if not matching:
-            known = ", ".join(f"{namespace}/{node}" for node in nodes)
             raise InputError(f"{path}: there is no node {name[:200]}; the nodes are {known}.")
         values = dict(_values(path, name, parameters, ""))
         for node in matching:
             found.setdefault(node, {}).update(values)
         if groups is not None:
             _leave_out(f"{path}: {name}", values, {node: groups[node] for node in matching}, found)
+    if not found and foreign:
+        raise InputError(f"{path}: names only {foreign[0][:200]}; the rig's nodes are {known}.")
     if not found:
         raise InputError(
             f"{path}: names no node; write values below {namespace}/{nodes[-1]}: {_PARAMETERS}, or "
@@ -231,6 +242,13 @@ def _matches(pattern: str, name: str) -> bool:
     """Tell whether a name in the file, wildcards included, means the node of this full name."""
     expression = re.escape(pattern).replace(r"/\*\*", r"(/\w+)*").replace(r"/\*", r"/\w+")
     return re.fullmatch(expression, name, re.ASCII) is not None
+
+
+def _is_foreign(name: str, namespace: str, nodes: Sequence[str]) -> bool:
+    """Tell whether a name that means no node of the rig is that of another program's node."""
+    known = [*nodes, *PROGRAMS.values()]
+    misspelt = difflib.get_close_matches(name.rpartition("/")[2], known, 1, _ALIKE)
+    return not misspelt and not name.startswith(f"{namespace}/")
 
 
 def _values(path: str | Path, node_name: str, node: Node, prefix: str) -> Iterator[tuple[str, Any]]:

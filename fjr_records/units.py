@@ -14,6 +14,8 @@ _TAKEN_FOR_RAD = {
 }
 _NEAR = 3.0
 """Factor up to which a ratio is like that of a unit: the loop need not follow exactly."""
+_NEAR_STICKING = 1.3
+"""The same where a rig that hardly moves may be the reason."""
 
 
 def following(reference: np.ndarray, position: np.ndarray) -> float:
@@ -28,17 +30,39 @@ def unit_taken_for_rad(ratio: float) -> str | None:
     return unit if max(ratio / factor, factor / ratio) < _NEAR else None
 
 
-def unit_sentence(ratio: float) -> str | None:
-    """Return what a ratio of y to r says against their units and the mend; None if nothing."""
-    if not ratio > FOLLOWING_LIMIT:
-        return None
-    unit = unit_taken_for_rad(ratio)
-    cause = "their units differ"
-    if unit is not None:
-        factor = _TAKEN_FOR_RAD[unit]
-        cause = f"y seems to be in {unit} and taken for rad, which gives {factor:.4g}"
-    return (
-        f"y is {ratio:.3g} times r at the lowest excited lines, but a position loop follows its "
-        f"reference: {cause}; give position and reference in rad (fjr import converts: "
-        "position=COLUMN:deg)."
+def may_stick(ratio: float) -> bool:
+    """Tell whether a rig that hardly moves explains a small ratio of y to r."""
+    degrees = _TAKEN_FOR_RAD["degrees"]
+    return ratio < 1.0 and not degrees / _NEAR_STICKING < 1.0 / ratio < degrees * _NEAR_STICKING
+
+
+def compare_units(ratio: float) -> tuple[float, str]:
+    """Return what a ratio of y to r says of their units, and the mend if they differ.
+
+    Returns:
+        The ratio, of r to y where r is the one that seems to be too large, which is beyond
+        FOLLOWING_LIMIT if the units differ; and a sentence.
+    """
+    mend = "give position and reference in rad (fjr import converts: {}=COLUMN:deg)."
+    if ratio > FOLLOWING_LIMIT:
+        unit = unit_taken_for_rad(ratio)
+        cause = "their units differ"
+        if unit is not None:
+            factor = _TAKEN_FOR_RAD[unit]
+            cause = f"y seems to be in {unit} and taken for rad, which gives {factor:.4g}"
+        return ratio, (
+            f"y is {ratio:.3g} times r at the lowest excited lines, but a position loop follows "
+            f"its reference: {cause}; {mend.format('position')}"
+        )
+    if not 0.0 < ratio < 1.0 / FOLLOWING_LIMIT:
+        return ratio, f"y is {ratio:.3g} times r at the lowest lines, as in one unit."
+    if may_stick(ratio):
+        return ratio, (
+            f"y is {ratio:.3g} times r at the lowest lines: the joint hardly moves, or r is in "
+            "another unit."
+        )
+    return 1.0 / ratio, (
+        f"r is {1.0 / ratio:.3g} times y at the lowest excited lines: the joint hardly moves, or r "
+        f"seems to be in degrees and taken for rad, which gives {_TAKEN_FOR_RAD['degrees']:.4g}; "
+        f"{mend.format('reference')}"
     )

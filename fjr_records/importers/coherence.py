@@ -20,7 +20,6 @@ root of the number of lines."""
 LEAST_LINES = 12
 _SEGMENTS = 16
 _CLEAR = 3.0
-_AS_DEGREES = 1.3
 _LAG = 0.1
 """Part of the record by which the position may lag behind the reference."""
 
@@ -122,9 +121,3 @@ def unit_doubt(ratio: float, one: str, other: str) -> str | None:
         f"the {large} is {times:.3g} times the {small}, as if it were in {unit} and taken for rad; "
         f"give its unit, as in {large}=COLUMN:{short}"
     )
-
-
-def may_stick(ratio: float) -> bool:
-    """Tell whether a rig that hardly moves explains a small ratio of position to reference."""
-    degrees = 180.0 / np.pi
-    return ratio < 1.0 and not degrees / _AS_DEGREES < 1.0 / ratio < degrees * _AS_DEGREES

@@ -10,6 +10,7 @@ import numpy as np
 
 from fjr_kit.errors import InputError
 
+from ..units import may_stick
 from . import coherence
 from .columns import read_columns
 from .import_map import Column
@@ -186,7 +187,7 @@ def _unit_doubts(
         if doubt is None:
             continue
         meant = columns[one].by_factor or columns[other].by_factor
-        if not (meant or (one == "position" and coherence.may_stick(ratio))):
+        if not (meant or (one == "position" and may_stick(ratio))):
             raise InputError(f"{path}: {doubt}.")
         doubts.append(doubt)
     return tuple(doubts)

@@ -204,6 +204,17 @@ def test_position_in_another_unit_taken_for_rad_is_named(factor, unit):
     assert "give position and reference in rad" in bad.sentence
 
 
+def test_a_reference_in_degrees_is_named_and_a_joint_that_sticks_is_not_said_to_follow():
+    r, u, y = signals(4)
+    follows = position_unit(read((r, u, y), grid()), LINES.excited).value
+    degrees = position_unit(read((np.degrees(r), u, y / follows), grid()), LINES.excited)
+    assert not degrees.passed and degrees.value == pytest.approx(180 / np.pi)
+    assert "r seems to be in degrees and taken for rad, which gives 57.3" in degrees.sentence
+    assert "reference=COLUMN:deg" in degrees.sentence
+    stuck = position_unit(read((r, u, y / follows / 20), grid()), LINES.excited)
+    assert stuck.passed and "the joint hardly moves, or r is in another unit" in stuck.sentence
+
+
 def test_position_of_no_known_unit_and_without_reference():
     r, u, y = signals(4)
     strange = position_unit(read((r, u, 1e9 * y), grid()), LINES.excited)

@@ -370,6 +370,17 @@ def test_an_absurd_reference_trips_and_winds_nothing_up():
     assert max(torques) <= VALUES["p"] * 0.01 + ROUNDING
 
 
+def test_after_a_torque_that_was_said_late_the_rate_counts_from_then():
+    stream = Stream(torque_soft_start_s=0.0)
+    stream.play(1, r=0.0)
+    stream.loop.leave_run(VALUES)
+    late = stream.now + round((TIMEOUT + 0.9 * TS) * 1e9)  # the process had no core
+    assert [torque for _, torque in stream.loop.serve(late)] == [0.0]
+    stream.loop.reference(MS, 0.05)
+    ((_, torque),) = stream.loop.position(late + MS // 10, MS, 0.0)
+    assert 0.0 < torque <= RATE * 0.1 * TS + ROUNDING
+
+
 def test_a_stray_old_stamp_or_a_new_run_does_not_step_the_torque():
     for leaves in (False, True):
         stream = Stream(torque_soft_start_s=0.0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import sys
 
 import pytest
@@ -101,6 +102,19 @@ def test_wildcard_names_all_nodes_and_the_later_entry_holds(tmp_path):
 def test_file_that_names_no_node_is_refused(tmp_path, text):
     with pytest.raises(InputError, match=r"rig\.yaml: names no node; write values below /rig/sim"):
         load_parameter_file(write(tmp_path, text))
+
+
+@pytest.mark.parametrize("name", ["move_group", "/**/move_group", "/arm/controller_manager"])
+def test_nodes_of_other_programs_are_passed_over_but_a_misspelt_name_is_not(tmp_path, name):
+    own = "/**:\n  simulator: {ros__parameters: {k1: 0.5}}\n"
+    other = f"{name}: {{ros__parameters: {{rate: 2}}}}\n"
+    assert load_parameter_file(write(tmp_path, other + own)) == {"simulator": {"k1": 0.5}}
+    with pytest.raises(InputError, match=r"rig\.yaml: names only /.*; the rig's nodes are /rig/ex"):
+        load_parameter_file(write(tmp_path, other))
+    for misspelt in ("/**/simulatr", "/rig/sim", "fjr_sim_node", "/rigg/controller"):
+        text = own + f"{misspelt}: {{ros__parameters: {{rate: 2}}}}\n"
+        with pytest.raises(InputError, match=f"there is no node /?{re.escape(misspelt)}"):
+            load_parameter_file(write(tmp_path, text))
 
 
 GROUPS = {

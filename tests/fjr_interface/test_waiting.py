@@ -153,27 +153,26 @@ def test_what_takes_the_place_of_a_node_and_who_says_nothing_is_told(start, rig)
 TAKEN = "error: Another node of this machine publishes /rig/{} in ROS domain {} already; end it, "
 
 
-@pytest.mark.parametrize(
-    ("letter", "topic"), [("s", "motor_position"), ("c", "motor_torque"), ("e", "reference")]
-)
-def test_a_second_node_is_refused_and_the_run_goes_on(start, rig, domain, letter, topic):
+PUBLISHED = {"s": "motor_position", "c": "motor_torque", "e": "reference"}
+
+
+def test_a_second_node_is_refused_and_the_run_goes_on(start, rig, domain):
     nodes = by_hand(start, periods=20)
-    for each in "sce":
+    for each in PUBLISHED:
         nodes[each]()
     rig.peer.spin_until(lambda: len(rig.torque) > 300, "torques")
-    second = nodes[letter]()
-    rig.peer.spin_until(lambda: second.process.poll() is not None, "the end of the second one")
-    assert second.exit_status() == 2
-    assert second.output.startswith(TAKEN.format(topic, domain)), second.output
-    assert second.output.count("\n") == 1
+    seconds = {topic: nodes[letter]() for letter, topic in PUBLISHED.items()}
+    for topic, second in seconds.items():
+        rig.peer.spin_until(lambda node=second: node.process.poll() is not None, f"no 2nd {topic}")
+        assert second.exit_status() == 2
+        assert second.output.startswith(TAKEN.format(topic, domain)), second.output
+        assert second.output.count("\n") == 1
     torque = rig.hear_all_of(described(periods=20))
     batch = run_realization(SIMULATOR.defaults(), described(periods=20))
     np.testing.assert_array_equal(torque, batch.torque)
 
 
-@pytest.mark.parametrize(
-    ("letter", "topic"), [("s", "motor_position"), ("c", "motor_torque"), ("e", "reference")]
-)
+@pytest.mark.parametrize(("letter", "topic"), PUBLISHED.items())
 def test_a_node_refuses_to_publish_beside_somebody_elses(start, rig, letter, topic):
     publisher: Any = rig.peer.node.create_publisher(rig.kind, topic, rig.qos)
     nodes = by_hand(start)
