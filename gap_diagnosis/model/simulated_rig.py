@@ -145,6 +145,11 @@ class Simulator:
         self._periods = max(description.transient_periods, 1) + 1
         self._inputs = [self._mean_inputs(realization) for realization in recorded.realizations]
         self._elapsed = [realization.experiment.elapsed_s for realization in recorded.realizations]
+        self._speeds = [
+            float(np.std(np.diff(r.position.ravel())) * self.sample_rate_hz)
+            for r in recorded.realizations
+        ]
+        self._torques = [float(np.abs(r.torque).max()) for r in recorded.realizations]
 
     @property
     def samples(self) -> int:
@@ -160,7 +165,7 @@ class Simulator:
 
         Returns:
             float64 (models, n, outputs, N) in rad; y, and q if the rig has a second encoder. A
-            motion that diverges gives NaN.
+            motion that diverges, or that would take too long to play, gives NaN.
         """
         runs = self._run(models, which)
         return runs[:, :, [0, 2][: self._outputs]]
@@ -207,6 +212,9 @@ class Simulator:
 
     def _one(self, job: tuple[Model, int]) -> np.ndarray:
         model, index = job
+        speed, torque = self._speeds[index], self._torques[index]
+        if too_stiff(model, self.samples, self.sample_rate_hz, speed, torque):
+            return np.full((3, self._samples), np.nan)
         try:
             run = self._simulated(model, self._inputs[index], self._elapsed[index])
         except InputError:

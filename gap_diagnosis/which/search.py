@@ -95,6 +95,7 @@ class Search:
         self._extend(refit, self._fitter.catalogue)
         leading = [fit.effects[0] for fit in self._ranked(1)[:_HELD]]
         self._extend(refit, holders(leading, self._fitter.catalogue))
+        self._drop_holders(1)
         best = refit
         self._polish(1)
         self._enrich(1)
@@ -302,6 +303,18 @@ class Search:
             alike += holders([swapped], self._fitter.catalogue)
             if alike:
                 self._extend(without(self._fitter, pairs[0], swapped), alike, near=_ALIKE)
+        self._drop_holders(2)
+
+    def _drop_holders(self, count: int) -> None:
+        """Drop explanations by a law of several parts where one of its parts does as well."""
+        for effects in [e for e in self._fits if len(e) == count]:
+            for held in (e for e in effects if fx.EFFECTS[e].on_request):
+                rest = [e for e in effects if e != held]
+                parts = (tuple(sorted((*rest, p))) for p in fx.EFFECTS[held].contains)
+                plain = [self._fits[p] for p in parts if p in self._fits]
+                if any(not self._calls_for(p, self._fits[effects], SECOND_GAIN) for p in plain):
+                    del self._fits[effects]
+                    break
 
     def _settled(self, count: int, near: float) -> set[tuple[str, ...]]:
         """Return which explanations of `count` effects another start could not help."""
