@@ -16,11 +16,11 @@
     return Object.fromEntries(Object.entries(value).map(([k, v]) => [k, themed(v, k)]));
   };
 
-  const layoutOf = (plot, height) => {
+  const layoutOf = (plot) => {
     const axis = {gridcolor: "--grid", linecolor: "--muted", zeroline: false, ticks: "outside", tickcolor: "--muted",
       automargin: true, exponentformat: "power"};
     const layout = {
-      height, margin: {l: 64, r: 40, t: 8, b: 44}, paper_bgcolor: "--paper", plot_bgcolor: "--paper",
+      margin: {l: 64, r: 40, t: 8, b: 44}, paper_bgcolor: "--paper", plot_bgcolor: "--paper",
       font: {family: "system-ui, sans-serif", size: 12, color: "--ink"}, hovermode: "closest",
       hoverlabel: {bgcolor: "--panel", bordercolor: "--rule", font: {color: "--ink"}},
       legend: {orientation: "h", x: 0, xanchor: "left", y: 1.01, yanchor: "bottom", bgcolor: "--paper"},
@@ -125,14 +125,19 @@
     })).finally(() => { linking = false; });
   };
 
+  // What a plot's place is high; plotly fills it, also when it takes a new width.
+  const heightOf = (place) => {
+    const higher = place.clientWidth < NARROW.width ? NARROW.height : 1;
+    return `${Math.round(Number(place.dataset.height) * (printing ? PRINTED.height : higher))}px`;
+  };
+
   const draw = (place) => {
     const plot = plotFor(place);
     place.closest("figure").hidden = !plot;
     if (!plot) return;
     const {data, layout: given, linked} = inView(plot);
-    const higher = place.clientWidth < NARROW.width ? NARROW.height : 1;
-    const height = Number(place.dataset.height) * (printing ? PRINTED.height : higher);
-    const layout = layoutOf({layout: given}, height);
+    place.style.height = heightOf(place);
+    const layout = layoutOf({layout: given});
     if (printing) layout.width = PRINTED.width;
     if (views.has(place) && !linked) layout.xaxis.range = views.get(place).slice();
     const isNew = !place.on;
@@ -194,6 +199,8 @@
     drawAll();
     if (!on) places.filter((place) => place.on).forEach((place) => Plotly.Plots.resize(place));
   };
+  addEventListener("resize", () =>
+    places.filter((place) => place.on && place.style.height !== heightOf(place)).forEach(draw));
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => drawAll());
   matchMedia("print").addEventListener("change", (event) => print(event.matches));
   addEventListener("beforeprint", () => print(true));
