@@ -93,6 +93,7 @@ def test_a_long_table_of_numbers_stays_a_table_and_one_of_sentences_does_not():
 
 def test_numbers_have_a_minus_sign_and_a_dash_where_there_is_none():
     assert number(-1.5e-7, ".2g") == "\N{MINUS SIGN}1.5e\N{MINUS SIGN}07"
+    assert number(-0.001, "+.1f") == number(0.001, "+.1f") == "0.0"
     assert number(float("nan"), ".2g") == number(float("inf"), "d") == "\N{EN DASH}"
 
 
