@@ -16,11 +16,11 @@
     return Object.fromEntries(Object.entries(value).map(([k, v]) => [k, themed(v, k)]));
   };
 
-  const layoutOf = (plot) => {
+  const layoutOf = (plot, height) => {
     const axis = {gridcolor: "--grid", linecolor: "--muted", zeroline: false, ticks: "outside", tickcolor: "--muted",
       automargin: true, exponentformat: "power"};
     const layout = {
-      margin: {l: 64, r: 40, t: 8, b: 44}, paper_bgcolor: "--paper", plot_bgcolor: "--paper",
+      height, margin: {l: 64, r: 40, t: 8, b: 44}, paper_bgcolor: "--paper", plot_bgcolor: "--paper",
       font: {family: "system-ui, sans-serif", size: 12, color: "--ink"}, hovermode: "closest",
       hoverlabel: {bgcolor: "--panel", bordercolor: "--rule", font: {color: "--ink"}},
       legend: {orientation: "h", x: 0, xanchor: "left", y: 1.01, yanchor: "bottom", bgcolor: "--paper"},
@@ -128,7 +128,7 @@
   // What a plot's place is high; plotly fills it, also when it takes a new width.
   const heightOf = (place) => {
     const higher = place.clientWidth < NARROW.width ? NARROW.height : 1;
-    return `${Math.round(Number(place.dataset.height) * (printing ? PRINTED.height : higher))}px`;
+    return Math.round(Number(place.dataset.height) * (printing ? PRINTED.height : higher));
   };
 
   const draw = (place) => {
@@ -136,8 +136,9 @@
     place.closest("figure").hidden = !plot;
     if (!plot) return;
     const {data, layout: given, linked} = inView(plot);
-    place.style.height = heightOf(place);
-    const layout = layoutOf({layout: given});
+    const height = heightOf(place);
+    place.style.height = `${height}px`;
+    const layout = layoutOf({layout: given}, height);
     if (printing) layout.width = PRINTED.width;
     if (views.has(place) && !linked) layout.xaxis.range = views.get(place).slice();
     const isNew = !place.on;
@@ -162,14 +163,14 @@
   document.querySelectorAll("button[data-level]").forEach((button) =>
     button.addEventListener("click", () => select(Number(button.dataset.level))));
 
-  // Switches of the frequency axis; the plots' own scale is marked until one is chosen.
+  // Switches of the frequency axis; the plots' own scale is marked, if all share it, until one is chosen.
   const press = () => {
     const plots = places.map(plotFor).filter((plot) => plot?.linked);
     document.querySelectorAll(".switches button").forEach((button) => {
       const {unit: own, scale: kind} = button.dataset;
       if (own) button.setAttribute("aria-pressed", String(own === unit));
       if (kind) {
-        button.setAttribute("aria-pressed", String(plots.some((plot) => isLog(plot.layout.xaxis) === (kind === "log"))));
+        button.setAttribute("aria-pressed", String(plots.every((plot) => isLog(plot.layout.xaxis) === (kind === "log"))));
       }
     });
   };
@@ -200,7 +201,7 @@
     if (!on) places.filter((place) => place.on).forEach((place) => Plotly.Plots.resize(place));
   };
   addEventListener("resize", () =>
-    places.filter((place) => place.on && place.style.height !== heightOf(place)).forEach(draw));
+    places.filter((place) => place.on && place.clientWidth && place.style.height !== `${heightOf(place)}px`).forEach(draw));
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => drawAll());
   matchMedia("print").addEventListener("change", (event) => print(event.matches));
   addEventListener("beforeprint", () => print(true));

@@ -63,17 +63,18 @@ def _sensitivity(bla: BlaEstimate, found: Sensitivity) -> Plot:
 
 
 def _nyquist(bla: BlaEstimate) -> Plot:
-    """Return G of each output in the complex plane, with discs."""
+    """Return G of each output in the complex plane, with discs of the reliable lines."""
     traces: list[Trace] = []
     for one, name, color in _outputs(bla):
-        discs = one.g[:, None] + one.radius_95[:, None] * CORNERS
+        radius = np.where(bla.reliable, one.radius_95, np.nan)
+        discs = one.g[:, None] + radius[:, None] * CORNERS
         traces.append(_discs(bla.frequency_hz, discs, f"95 % discs, {name}", color))
         traces.append(_curve(bla.frequency_hz, one.g, f"G, {name}", color, "rad/(N m)"))
     return plane(traces, "real part (rad/(N m))", "imaginary part (rad/(N m))", _around(bla))
 
 
 def _around(bla: BlaEstimate) -> tuple[float, float, float, float] | None:
-    """Return what holds G and the discs of the reliable lines; one weak line would hide them."""
+    """Return what holds G and the discs of the reliable lines."""
     parts = [(one.g[bla.reliable], one.radius_95[bla.reliable]) for one, *_ in _outputs(bla)]
     g, radius = (np.concatenate(part) for part in zip(*parts, strict=True))
     if not g.size:

@@ -137,7 +137,10 @@ def test_what_is_seen_of_the_nyquist_plot_holds_the_reliable_lines_alone(result)
     radius = np.where(doubtful, 1e3, level.bla.radius_95)
     bla = level.bla.model_copy(update={"reliable": ~doubtful, "radius_95": radius})
     weak = result.model_copy(update={"levels": [level.model_copy(update={"bla": bla})]})
-    layout = Page(render_report(weak, {})).data()["levels"][0]["nyquist"]["layout"]
+    nyquist = Page(render_report(weak, {})).data()["levels"][0]["nyquist"]
+    [discs] = [t for t in nyquist["data"] if t["name"].startswith("95 % discs")]
+    assert max(abs(x) for x in discs["x"] if x is not None) < 1.0
+    layout = nyquist["layout"]
     for axis, values in (("xaxis", bla.g.real), ("yaxis", bla.g.imag)):
         low, high = layout[axis]["range"]
         g, reach = values[~doubtful], radius[~doubtful]

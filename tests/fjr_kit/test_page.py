@@ -15,6 +15,7 @@ TEMPLATE = """{% extends "page.html" %}
 {% block top %}{{ parts.bullets(items) }}{% endblock %}
 {% block sections %}{{ parts.table(columns, rows, caption, levels) }}
 {% call parts.figure("one", 300) %}{{ caption }}{% endcall %}
+{% call parts.figure("two", 200) %}{{ caption }}{% endcall %}
 {{ parts.level_choice(items) }}{{ parts.bags(items) }}
 {{ parts.verdict(caption) }}{% endblock %}
 """

@@ -20,6 +20,9 @@ SCRIPT = """
     x: plots[0].data[0].x, hover: plots[0].data[0].hovertemplate,
   });
   found.narrow = state();
+  find("button[data-level='2']").click();
+  await rest();
+  found.mixed = state();
   find("button[data-level='1']").click();
   await rest();
   found.wide = state();
@@ -56,7 +59,9 @@ def over(frequency_hz: np.ndarray):
 @pytest.fixture
 def found(shown, tmp_path):  # noqa: F811
     narrow, wide = np.linspace(8.0, 40.0, 9), np.geomspace(1.0, 100.0, 9)
-    page = shown([], items=["narrow", "wide"], levels=[over(narrow), over(wide)])
+    mixed = over(narrow) | {"two": over(wide)["one"]}
+    levels = [over(narrow), over(wide), mixed]
+    page = shown([], items=["narrow", "wide", "mixed"], levels=levels)
     file = tmp_path / "page.html"
     file.write_text(page, encoding="utf-8")
     return found_in(file, SCRIPT)
@@ -82,3 +87,7 @@ def test_a_plot_keeps_its_height_when_the_window_or_the_medium_changes(found):
     heights = [first["height"], narrower["height"], back["height"], after_print["height"]]
     assert heights == [300] * 4 and card["height"] == 360
     assert all(size["place"] == size["height"] for size in found["sizes"])
+
+
+def test_no_scale_is_marked_where_plots_differ(found):
+    assert found["mixed"]["pressed"] == ["Hz"]
