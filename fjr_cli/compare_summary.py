@@ -8,6 +8,7 @@ from rich.console import Console
 
 from fjr_compare import words
 from fjr_compare.result import Comparison, Pair
+from fjr_kit.number_text import unsigned_zero
 from fjr_kit.page import Mark, Row
 from fjr_kit.terminal import print_table
 
@@ -66,7 +67,7 @@ def _cell(cell: object, form: str) -> str:
     if isinstance(cell, Mark):
         return cell.word
     if isinstance(cell, float):
-        return format(cell, form) if cell == cell else "-"
+        return unsigned_zero(format(cell, form)) if cell == cell else "-"
     return str(cell)
 
 

@@ -180,6 +180,8 @@ def _read(path: str | Path) -> str:
                 f"{path}: is longer than {MOST_CHARACTERS} bytes; name a parameter file."
             )
         return text.decode("utf-8")
+    except IsADirectoryError:
+        raise InputError(f"{path}: is a folder; name a parameter file.") from None
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}.") from None
     except UnicodeDecodeError:

@@ -18,6 +18,7 @@ from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 from plotly.offline import get_plotlyjs
 
 from .check import Check
+from .number_text import unsigned_zero
 
 SENTENCE = 40
 """A cell that is longer than this many characters is a sentence."""
@@ -106,8 +107,9 @@ def asset(name: str) -> str:
 
 def number(value: float, form: str) -> str:
     """Return a number as a page shows it: with a minus sign, a dash where it is not finite."""
-    text = format(value, form) if isfinite(value) else "\N{EN DASH}"
-    return text.replace("-", "\N{MINUS SIGN}")
+    if not isfinite(value):
+        return "\N{EN DASH}"
+    return unsigned_zero(format(value, form)).replace("-", "\N{MINUS SIGN}")
 
 
 def narrow_form(rows: Sequence[Row]) -> str:

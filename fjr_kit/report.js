@@ -125,13 +125,19 @@
     })).finally(() => { linking = false; });
   };
 
+  // What a plot's place is high; plotly fills it, also when it takes a new width.
+  const heightOf = (place) => {
+    const higher = place.clientWidth < NARROW.width ? NARROW.height : 1;
+    return Math.round(Number(place.dataset.height) * (printing ? PRINTED.height : higher));
+  };
+
   const draw = (place) => {
     const plot = plotFor(place);
     place.closest("figure").hidden = !plot;
     if (!plot) return;
     const {data, layout: given, linked} = inView(plot);
-    const higher = place.clientWidth < NARROW.width ? NARROW.height : 1;
-    const height = Number(place.dataset.height) * (printing ? PRINTED.height : higher);
+    const height = heightOf(place);
+    place.style.height = `${height}px`;
     const layout = layoutOf({layout: given}, height);
     if (printing) layout.width = PRINTED.width;
     if (views.has(place) && !linked) layout.xaxis.range = views.get(place).slice();
@@ -157,14 +163,14 @@
   document.querySelectorAll("button[data-level]").forEach((button) =>
     button.addEventListener("click", () => select(Number(button.dataset.level))));
 
-  // Switches of the frequency axis; the plots' own scale is marked until one is chosen.
+  // Switches of the frequency axis; the plots' own scale is marked, if all share it, until one is chosen.
   const press = () => {
     const plots = places.map(plotFor).filter((plot) => plot?.linked);
     document.querySelectorAll(".switches button").forEach((button) => {
       const {unit: own, scale: kind} = button.dataset;
       if (own) button.setAttribute("aria-pressed", String(own === unit));
       if (kind) {
-        button.setAttribute("aria-pressed", String(plots.some((plot) => isLog(plot.layout.xaxis) === (kind === "log"))));
+        button.setAttribute("aria-pressed", String(plots.every((plot) => isLog(plot.layout.xaxis) === (kind === "log"))));
       }
     });
   };
@@ -194,6 +200,8 @@
     drawAll();
     if (!on) places.filter((place) => place.on).forEach((place) => Plotly.Plots.resize(place));
   };
+  addEventListener("resize", () =>
+    places.filter((place) => place.on && place.clientWidth && place.style.height !== `${heightOf(place)}px`).forEach(draw));
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => drawAll());
   matchMedia("print").addEventListener("change", (event) => print(event.matches));
   addEventListener("beforeprint", () => print(true));

@@ -16,6 +16,7 @@ MOST_DISCS = 150
 CIRCLE = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 97))
 WINDOW = (-3.5, 1.5, -2.5, 2.5)
 """What is seen of the loop at first: the neighbourhood of -1."""
+_EDGE = 0.05  # of what is seen of G
 OTHER = "|T| = |1 \N{MINUS SIGN} S|"
 POINT = "%{customdata:.4g} Hz<br>%{x:.4g}, %{y:.4g} i"
 
@@ -62,13 +63,27 @@ def _sensitivity(bla: BlaEstimate, found: Sensitivity) -> Plot:
 
 
 def _nyquist(bla: BlaEstimate) -> Plot:
-    """Return G of each output in the complex plane, with discs."""
+    """Return G of each output in the complex plane, with discs of the reliable lines."""
     traces: list[Trace] = []
     for one, name, color in _outputs(bla):
-        discs = one.g[:, None] + one.radius_95[:, None] * CORNERS
+        radius = np.where(bla.reliable, one.radius_95, np.nan)
+        discs = one.g[:, None] + radius[:, None] * CORNERS
         traces.append(_discs(bla.frequency_hz, discs, f"95 % discs, {name}", color))
         traces.append(_curve(bla.frequency_hz, one.g, f"G, {name}", color, "rad/(N m)"))
-    return plane(traces, "real part (rad/(N m))", "imaginary part (rad/(N m))")
+    return plane(traces, "real part (rad/(N m))", "imaginary part (rad/(N m))", _around(bla))
+
+
+def _around(bla: BlaEstimate) -> tuple[float, float, float, float] | None:
+    """Return what holds G and the discs of the reliable lines."""
+    parts = [(one.g[bla.reliable], one.radius_95[bla.reliable]) for one, *_ in _outputs(bla)]
+    g, radius = (np.concatenate(part) for part in zip(*parts, strict=True))
+    if not g.size:
+        return None
+    reach = np.nan_to_num(radius)
+    spans = [(float((at - reach).min()), float((at + reach).max())) for at in (g.real, g.imag)]
+    (left, right), (low, high) = spans
+    edge = _EDGE * max(right - left, high - low)
+    return left - edge, right + edge, low - edge, high + edge
 
 
 def _loop(bla: BlaEstimate, found: Sensitivity) -> Plot:

@@ -59,9 +59,13 @@ def _detection_sentences(level: LevelResult) -> list[str]:
         if not np.isfinite(power):
             continue
         noise = _beside_noise(power - mean_level_db(lines.noise))
-        below = linear - power
-        sentences.append(f"{name} distortion {below:.1f} dB below the excited lines{noise}.")
+        sentences.append(f"{name} distortion {_beside_excited(power - linear)}{noise}.")
     return sentences
+
+
+def _beside_excited(above_db: float) -> str:
+    """Return how a level lies to that of the excited lines."""
+    return f"{abs(above_db):.1f} dB {'above' if above_db > 0 else 'below'} the excited lines"
 
 
 def _beside_noise(above_db: float) -> str:
@@ -78,10 +82,10 @@ def _total_sentences(level: LevelResult, bla: BlaEstimate) -> list[str]:
     total = mean_level_db(total_distortion(level))
     if not np.isfinite(total):
         return []
-    below = mean_level_db(level.excited.position) - total
     noise = mean_level_db(level.excited.noise) if bla.method == "local" else np.nan
     what = "Total distortion and noise" if np.isnan(noise) else "Total distortion with its noise"
-    sentences = [f"{what} {below:.1f} dB below the excited lines{_beside_noise(total - noise)}."]
+    beside = _beside_excited(total - mean_level_db(level.excited.position))
+    sentences = [f"{what} {beside}{_beside_noise(total - noise)}."]
     if bla.method == "local" and np.isnan(noise):
         sentences.append(
             "Distortion and noise cannot be told apart: no run was repeated, so repeat one."

@@ -94,13 +94,15 @@ def significant(bla: BlaEstimate) -> np.ndarray:
 def total_distortion(level: LevelResult) -> np.ndarray:
     """Return the rms of distortion and noise in y at the excited lines of one realization, rad.
 
-    The answer of the loop to them is taken away; by the coherence, NaN where that is unknown.
+    The answer of the loop to them is taken away; by the coherence, NaN where that is unknown or
+    the line is not reliable, as G and with it that answer are not known there.
     """
     if level.bla is None:
         return np.full(level.excited.position.shape, np.nan)
     with np.errstate(divide="ignore"):
         rest = 1.0 / level.bla.coherence - 1.0
-    return np.asarray(np.abs(level.bla.g) * level.excited.torque * np.sqrt(rest))
+    known = np.abs(level.bla.g) * level.excited.torque * np.sqrt(rest)
+    return np.where(level.bla.reliable, known, np.nan)
 
 
 def mean_level_db(amplitude: np.ndarray) -> float:
@@ -119,8 +121,8 @@ class LevelSummary:
         significant, negative: lines whose nonlinear variance is significant, or negative.
         radius_percent: median over lines of the 95 % disc radius over |G|, in percent.
         linear_db, total_db, odd_db, even_db, noise_db: mean power of Y at excited lines, of
-            distortion and noise there, of Yc at odd and even detection lines, and of noise, in dB
-            re 1 rad; NaN where there is none.
+            distortion and noise at the reliable ones, of Yc at odd and even detection lines, and of
+            noise, in dB re 1 rad; NaN where there is none.
     """
 
     level: int

@@ -16,9 +16,11 @@ def data_notes(recorded: RecordedExperiment, noise: NoiseLevels | None) -> list[
         notes.append(ONE_PERIOD)
     elif not noise.measurable.all():
         which = [str(v) for v, seen in zip(noise.levels, noise.measurable, strict=True) if not seen]
+        shown = ", ".join(which)
+        silent = f"Level {shown} shows" if len(which) == 1 else f"Levels {shown} show"
         notes.append(
-            f"Level {', '.join(which)} shows no noise, so significance is stated against the "
-            "numerical floor of the simulation and cannot be trusted as such."
+            f"{silent} no noise, so significance is stated against the numerical floor of the "
+            "simulation and cannot be trusted as such."
         )
     if min(counts) < 2:
         notes.append(

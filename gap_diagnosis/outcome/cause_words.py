@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+from fjr_kit.number_text import unsigned_zero
+
 from .diagnosis import Cause, Diagnosis, Estimate, EvidenceKind, Figure, Place
 from .verdict_words import explanation
 
@@ -27,6 +29,8 @@ EXCITATION: dict[str, str] = {
     "periodic": "Steady periods were compared.",
     "record": "The records were compared as they came, in windows.",
 }
+LEAST_PERCENT = 1e-3
+"""A smaller share is shown as less than that: its digits mean nothing to a reader."""
 _MOST_DIGITS = 6
 _AS_NOISE = 1.5  # times what noise leaves: a remainder no greater than that has no look of its own
 
@@ -89,12 +93,17 @@ def share_words(figure: Figure | None) -> str:
 
 
 def percent(ratio: float | None) -> str:
-    """Return a ratio in percent, with two digits below ten; a dash where it is not known."""
+    """Return a ratio in percent, with two digits below ten; a dash where it is not known.
+
+    What is smaller than `LEAST_PERCENT` is said to be so, and is zero where it is negative.
+    """
     if ratio is None or not known(ratio):
         return "-"
     value = 100.0 * ratio
     size = abs(value)
-    if size >= 9.95 or size == 0.0:
+    if size < LEAST_PERCENT:
+        return f"<{LEAST_PERCENT:g}%" if value > 0.0 else "0%"
+    if size >= 9.95:
         return f"{value:.0f}%"
     return f"{value:.{max(1 - math.floor(math.log10(size)), 1)}f}%"
 
@@ -114,7 +123,8 @@ def digits(estimate: Estimate) -> tuple[str, str, str]:
     last = math.floor(math.log10(width)) - 1
     last = max(last, math.floor(math.log10(greatest)) - _MOST_DIGITS + 1)
     if 1e-6 <= greatest < 1e6:
-        return tuple(f"{v:.{max(-last, 0)}f}" for v in values)  # type: ignore[return-value]
+        fixed = [unsigned_zero(f"{v:.{max(-last, 0)}f}") for v in values]
+        return fixed[0], fixed[1], fixed[2]
     shown = max(math.floor(math.log10(greatest)) - last, 0)
     return tuple(f"{v:.{shown}e}" for v in values)  # type: ignore[return-value]
 

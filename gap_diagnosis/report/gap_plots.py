@@ -137,7 +137,7 @@ def ranking_plot(attribution: Attribution, held_size: int, data: str = "held-out
     refit = misfit[fits.index(attribution.refit)]
     traces += [_line(1.0, ends, "noise", "--noise"), _line(refit, ends, "refit", "--model")]
     axes = layout(f"{data} misfit", "", log_x=True)
-    axes["xaxis"] |= {"tickformat": "~s"}
+    axes["xaxis"] |= {"tickformat": ""}
     axes["yaxis"] |= {
         "tickvals": at.tolist(),
         "ticktext": [_name(fit) for fit in fits],
@@ -184,7 +184,7 @@ def torque_plot(before: ResidualTorque, after: ResidualTorque | None, level: int
     traces = []
     for row, coordinate in enumerate(COORDINATES, start=1):
         directions = (0,) if coordinate == "velocity" else (1, -1)
-        stages = ((after, "best explanation", "--noise"), (before, "after the refit", "--excited"))
+        stages = ((before, "after the refit", "--model"), (after, "best explanation", "--excited"))
         for residual, name, color in stages:
             if residual is None:
                 continue

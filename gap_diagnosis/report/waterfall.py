@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from fjr_kit.figure_style import EVEN, EXCITED, NOISE, ODD, WIDTH_IN
 from fjr_kit.plots import BARRED, Plot, layout, numbers
 
-from ..outcome.cause_words import known, percent
+from ..outcome.cause_words import LEAST_PERCENT, known, percent
 from ..outcome.diagnosis import Diagnosis
 from ..outcome.verdict_words import explanation
 
@@ -23,6 +23,7 @@ _COLORS = {"whole": "--muted", "less": "--excited", "more": "--odd", "left": "--
 _INKS = {"whole": "#A8ADB5", "less": EXCITED, "more": ODD, "left": EVEN, "noise": NOISE}
 _NAMES = {"whole": "nominal", "less": "closed", "more": "opened", "left": "remainder",
           "noise": "noise"}  # fmt: skip
+_ROOM = {"t": 36, "r": 76}  # px; a label may begin where the longest bar ends
 _LOWEST = 0.5  # of the least gap: where bars begin on a logarithmic axis
 
 
@@ -76,8 +77,11 @@ def bars(diagnosis: Diagnosis) -> list[Bar]:
 
 
 def _lowest(shown: list[Bar]) -> float:
-    """Return where whole bars begin: 0, or the low end of a logarithmic axis."""
-    ends = [bar.end for bar in shown if bar.end > 0.0]
+    """Return where whole bars begin: 0, or the low end of a logarithmic axis.
+
+    What is smaller than `LEAST_PERCENT` has no bar, only its label.
+    """
+    ends = [max(bar.end, LEAST_PERCENT) for bar in shown if bar.end > 0.0]
     return _LOWEST * min(ends) if ends and max(ends) > WIDE * min(ends) else 0.0
 
 
@@ -105,7 +109,7 @@ def waterfall_plot(diagnosis: Diagnosis) -> Plot | None:
             "hovertemplate": "%{text}<extra>%{fullData.name}</extra>",
         })  # fmt: skip
     axes = layout("rms error of the position, % of its rms", "", log_x=lowest > 0.0)
-    greatest = max(max(bar.start, bar.end) for bar in shown)
+    greatest = max(LEAST_PERCENT, *(max(bar.start, bar.end) for bar in shown))
     if lowest:
         axes["xaxis"]["range"] = [math.log10(lowest), math.log10(2.5 * greatest)]
     else:
@@ -116,7 +120,7 @@ def waterfall_plot(diagnosis: Diagnosis) -> Plot | None:
         "range": [len(shown) - 0.4, -0.6],
         "showgrid": False,
     }
-    return {"data": traces, "layout": axes | BARRED}
+    return {"data": traces, "layout": axes | BARRED | {"margin": _ROOM}}
 
 
 def height(diagnosis: Diagnosis) -> int:
@@ -141,6 +145,8 @@ def draw_waterfall(diagnosis: Diagnosis) -> Figure:
     if lowest:
         axis.set_xscale("log")
         axis.set_xlim(left=lowest)
+    elif max(bar.end for bar in shown) < LEAST_PERCENT:
+        axis.set_xlim(0.0, LEAST_PERCENT)
         axis.xaxis.set_major_formatter(lambda x, _: f"{x:g}")
     axis.set_yticks(range(len(shown)), [bar.name for bar in shown])
     axis.grid(False, axis="y")

@@ -26,6 +26,7 @@ from bla_analyzer.results.summary import (
     phase_deg,
     signal_at,
     summarize,
+    total_distortion,
 )
 from bla_analyzer.results.tables import UNITS, frf_csv, frf_mat, frf_npz
 from fjr_kit.check import Check
@@ -406,6 +407,26 @@ def test_one_realization_is_not_compared_with_others(result):
         bla = changed(level.bla, realizations=realizations, reliable=~doubtful)
         [sentence] = [s for s in findings(changed(level, bla=bla)) if "unreliab" in s]
         assert sentence.startswith(f"3 lines unreliable: the torque {says}")
+
+
+def test_distortion_of_all_lines_is_that_of_the_reliable_ones(result):
+    level = result.levels[1]
+    doubtful = np.arange(len(level.bla.g)) < 3
+    coherence = np.where(doubtful, 1e-12, level.bla.coherence)
+    known = mean_level_db(total_distortion(level)[~doubtful])
+    weak = changed(level, bla=changed(level.bla, reliable=~doubtful, coherence=coherence))
+    assert summarize(weak).total_db == pytest.approx(known)
+    sure = changed(level, bla=changed(level.bla, coherence=coherence))
+    assert summarize(sure).total_db > known + 100.0
+
+
+def test_distortion_beyond_the_excited_lines_is_said_to_be_above_them(result):
+    level = result.levels[1]
+    weak = changed(level, bla=changed(level.bla, coherence=np.full_like(level.bla.coherence, 0.1)))
+    [sentence] = [s for s in findings(weak) if s.startswith("Total distortion")]
+    assert "dB above the excited lines" in sentence and "-" not in sentence
+    [sentence] = [s for s in findings(level) if s.startswith("Total distortion")]
+    assert "dB below the excited lines" in sentence
 
 
 def test_decibel_of_nothing_is_unknown():

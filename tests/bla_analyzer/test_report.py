@@ -131,6 +131,23 @@ def test_the_band_and_the_discs_are_those_of_the_result(result, html):
     assert 10 ** (top["y"][0] / 20) == pytest.approx(peak, rel=1e-4)
 
 
+def test_what_is_seen_of_the_nyquist_plot_holds_the_reliable_lines_alone(result):
+    level = result.levels[1]
+    doubtful = np.arange(level.bla.g.size) < 3
+    radius = np.where(doubtful, 1e3, level.bla.radius_95)
+    bla = level.bla.model_copy(update={"reliable": ~doubtful, "radius_95": radius})
+    weak = result.model_copy(update={"levels": [level.model_copy(update={"bla": bla})]})
+    nyquist = Page(render_report(weak, {})).data()["levels"][0]["nyquist"]
+    [discs] = [t for t in nyquist["data"] if t["name"].startswith("95 % discs")]
+    assert max(abs(x) for x in discs["x"] if x is not None) < 1.0
+    layout = nyquist["layout"]
+    for axis, values in (("xaxis", bla.g.real), ("yaxis", bla.g.imag)):
+        low, high = layout[axis]["range"]
+        g, reach = values[~doubtful], radius[~doubtful]
+        assert low < (g - reach).min() and (g + reach).max() < high
+        assert high - low < 1.0
+
+
 def told(made: Result) -> str:
     return " ".join(" ".join(Page(render_report(made, {})).texts).split())
 

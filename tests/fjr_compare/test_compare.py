@@ -7,9 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from html_page import EVIL, Page
+from rich.console import Console
 from typer.testing import CliRunner
 
 from fjr_cli.app import app
+from fjr_cli.compare_summary import print_comparison
 from fjr_compare import Comparison, compare, write_comparison
 from fjr_compare.comparing import judged_pairs
 from fjr_compare.diagnoses import compared_diagnoses
@@ -183,3 +185,15 @@ def test_a_campaign_beside_itself_has_not_changed(campaign_result, tmp_path):
     assert "No change that can be told from chance" in "".join(page.texts)
     assert all(plot["linked"] for plot in page.data()["overview"].values())
     assert ("nav", {"class": "switches", "aria-label": "Frequency axis"}) in page.tags
+
+
+def test_a_change_that_is_rounded_to_zero_has_no_sign(campaign_result):
+    found = compare([campaign_result, campaign_result])
+    [pair] = found.pairs
+    level = pair.levels[0]
+    powers = [power.model_copy(update={"change_db": -0.02}) for power in level.powers]
+    pair = pair.model_copy(update={"levels": [level.model_copy(update={"powers": powers})]})
+    console = Console(record=True, width=200)
+    print_comparison(found.model_copy(update={"pairs": [pair]}), console)
+    text = console.export_text()
+    assert " 0.0 " in text and "-0.0 " not in text

@@ -273,6 +273,8 @@ def test_bad_file_is_refused_in_one_sentence(tmp_path, text, says):
 def test_unreadable_and_binary_files(tmp_path):
     with pytest.raises(InputError, match=r"none\.yaml: cannot be read: No such file"):
         load_parameter_file(tmp_path / "none.yaml")
+    with pytest.raises(InputError, match="is a folder; name a parameter file"):
+        load_parameter_file(tmp_path)
     path = tmp_path / "rig.yaml"
     path.write_bytes(b"\xff\xfe\x00")
     with pytest.raises(InputError, match="not a text file in UTF-8"):

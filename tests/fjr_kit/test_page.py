@@ -15,6 +15,7 @@ TEMPLATE = """{% extends "page.html" %}
 {% block top %}{{ parts.bullets(items) }}{% endblock %}
 {% block sections %}{{ parts.table(columns, rows, caption, levels) }}
 {% call parts.figure("one", 300) %}{{ caption }}{% endcall %}
+{% call parts.figure("two", 200) %}{{ caption }}{% endcall %}
 {{ parts.level_choice(items) }}{{ parts.bags(items) }}
 {{ parts.verdict(caption) }}{% endblock %}
 """
@@ -93,6 +94,7 @@ def test_a_long_table_of_numbers_stays_a_table_and_one_of_sentences_does_not():
 
 def test_numbers_have_a_minus_sign_and_a_dash_where_there_is_none():
     assert number(-1.5e-7, ".2g") == "\N{MINUS SIGN}1.5e\N{MINUS SIGN}07"
+    assert number(-0.001, "+.1f") == number(0.001, "+.1f") == "0.0"
     assert number(float("nan"), ".2g") == number(float("inf"), "d") == "\N{EN DASH}"
 
 

@@ -9,6 +9,8 @@ import pytest
 from gap_cases import SHORT, fitter_of, simulate_case
 
 from gap_diagnosis.model.simulated_rig import Model
+from gap_diagnosis.outcome.cause_words import digits, percent
+from gap_diagnosis.outcome.diagnosis import Estimate
 from gap_diagnosis.which.estimates import estimates, standard_errors, sure
 from gap_diagnosis.which.fits import Fit
 from gap_diagnosis.which.least_squares import Solution
@@ -153,3 +155,18 @@ def test_a_size_that_its_shape_hides_is_kept_from_zero_by_the_fit_without_it():
     seen = estimates(strong, groups)["backlash.half_gap_rad"]
     assert seen.low == pytest.approx(0.5e-3) and seen.high == hidden.high
     assert sure(strong, groups)
+
+
+def test_a_value_that_is_rounded_to_zero_has_no_sign():
+    shown = digits(Estimate(value=-1e-9, low=-1.2e-5, high=1.2e-5))
+    assert shown == ("0.000000", "-0.000012", "0.000012")
+
+
+def test_a_share_that_is_too_small_to_matter_is_said_to_be_so():
+    assert [percent(v) for v in (2.4e-17, -2.4e-17, 0.0)] == ["<0.001%", "0%", "0%"]
+    assert [percent(v) for v in (1.2e-5, 3.5e-6, 0.12, -0.002)] == [
+        "0.0012%",
+        "<0.001%",
+        "12%",
+        "-0.20%",
+    ]

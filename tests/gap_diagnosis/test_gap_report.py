@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import re
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
@@ -36,7 +37,7 @@ from gap_diagnosis.outcome.verdict_words import WORDS
 from gap_diagnosis.report.gap_output import write_diagnosis
 from gap_diagnosis.report.gap_report import render_gap_report
 from gap_diagnosis.report.updated_parameters import updated_values
-from gap_diagnosis.report.waterfall import bars
+from gap_diagnosis.report.waterfall import bars, draw_waterfall, waterfall_plot
 from gap_diagnosis.where.residual_map import residual_map
 from gap_diagnosis.which.attribution import Attribution
 from gap_diagnosis.which.fits import Fit
@@ -161,6 +162,34 @@ def test_the_waterfall_goes_from_the_nominal_to_the_noise_and_each_bar_begins_wh
     assert np.allclose(closed["base"], [refit, best], rtol=1e-5)
     assert np.allclose(np.add(closed["base"], closed["x"]), [nominal, refit], rtol=1e-4)
     assert plot["layout"]["xaxis"]["type"] == "log"  # the nominal is far above the noise
+
+
+def gaps_of(diagnosis: Diagnosis, nrmse: Sequence[float], noise: float) -> Diagnosis:
+    stages = [
+        step.model_copy(update={"nrmse_position": value})
+        for step, value in zip(diagnosis.steps, nrmse, strict=True)
+    ]
+    floor = diagnosis.gap.noise_floor.model_copy(update={"nrmse_position": noise})
+    gap = diagnosis.gap.model_copy(update={"noise_floor": floor})
+    return diagnosis.model_copy(update={"steps": stages, "gap": gap})
+
+
+@pytest.mark.parametrize("nominal", [0.12, 3e-17])
+def test_a_gap_that_is_nothing_but_rounding_is_shown_as_less_than_what_matters(found, nominal):
+    diagnosis = gaps_of(found.diagnosis, [nominal, 2.4e-17, 1e-17], 0.0)
+    labels = [bar.label for bar in bars(diagnosis)]
+    first = "12%" if nominal > 0.1 else "<0.001%"
+    assert labels == [first, "to <0.001%", "to <0.001%", "<0.001%", "0%"]
+    plot = waterfall_plot(diagnosis)
+    axis = plot["layout"]["xaxis"]
+    if nominal > 0.1:
+        assert axis["type"] == "log" and axis["range"][0] > -4.0
+    else:
+        assert axis["range"][1] >= 1e-3
+    longest = max(x for trace in plot["data"] for x in trace["x"])
+    assert longest == pytest.approx(100.0 * nominal, rel=0.01)
+    axes = draw_waterfall(diagnosis).axes[0]
+    assert axes.get_xlim()[1] >= 1e-3
 
 
 def test_causes_and_evidence_are_said(page):

@@ -211,4 +211,4 @@ def test_what_the_data_cannot_say_is_noted_and_is_no_failure():
     for part in ("one period", "one realization", "one level"):
         assert part in notes
     silent = check_gates(simulate_case(noise_rad=0.0).recorded, NOMINAL)
-    assert silent.hint == "none" and "shows no noise" in " ".join(silent.notes)
+    assert silent.hint == "none" and "show no noise" in " ".join(silent.notes)
