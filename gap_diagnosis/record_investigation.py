@@ -225,16 +225,22 @@ def _kept(
 def _alternatives(
     fitter: CellFitter, found: Found, tested: Tested, names: Sequence[str]
 ) -> list[str]:
-    """Return the effects that do as well in place of a cause, all else fitted anew."""
+    """Return the effects that do as well in place of a cause, all else fitted anew.
+
+    A near equivalent is in the set unless unseen parts tell it from the cause as surely as they
+    must show a cause at all.
+    """
     best = found.best
-    tried = {*partners([tested.effect], set(names)), *found.alternatives.get(tested.effect, ())}
+    near = {*partners([tested.effect], set(names))}
     tied = []
-    for effect in sorted(tried - set(best.effects)):
+    for effect in sorted({*near, *found.alternatives.get(tested.effect, ())} - set(best.effects)):
         proposals = fitter.screening(tested.without, effect).proposals()
         other = fitter.add(tested.without, effect, proposals) if proposals else None
         if other is None:
             continue
-        if stands_for(gain(fitter, best, other), tested.gain.mean):
+        behind = gain(fitter, best, fitter.further(other))
+        as_well = stands_for(behind, tested.gain.mean)
+        if as_well or (effect in near and not behind.present):
             tied.append(effect)
     return tied
 

@@ -4,6 +4,11 @@ No model of a real rig leaves noise alone. So the weight of a cell of the eviden
 noise: it is estimated from what the fit leaves on the fitted parts, and the fit is repeated with it
 (iteratively reweighted least squares, the maximum-likelihood estimate for unknown variances by
 cell). Models are compared by the log-likelihood of parts that no fit has seen.
+
+Noise is another number on every line. What a remainder leaves on the lines of one band is not: it
+comes from a few causes, such as friction that is a little other in this run. So a band counts for
+as many numbers as it has lines only so far as noise is what is left; else a thousand fine lines of
+one run outweigh an offset of all, and a fit follows the friction of that run.
 """
 
 from __future__ import annotations
@@ -31,6 +36,8 @@ _LEAST_PROMISE = 20.0  # a start that gains less than this (twice the nats) is n
 _STARTS = 2
 RIPPLES_TRIED = 3
 _RIVAL = 0.05  # an error: a second start that costs so much more than the first is not pursued
+_COHERENT = 4.0
+"""Independent numbers, at the most, that a remainder leaves in a band of a part."""
 _ACTS = (
     0.1  # of what is left in a band of a part: an effect that moves it by less does not act there
 )
@@ -44,7 +51,7 @@ class CellFit:
         effects: identifiers in the order in which they were added.
         space: what was free.
         model: the fitted model.
-        solution: the optimiser's end, its residuals in standard deviations of `variance`.
+        solution: the optimiser's end, its residuals and Jacobian times `CellFitter.weight`.
         variance: (cells,), of an error in each cell, rad2.
         left: (parts, bands), mean square of what is left on each part that selects, noise and the
             simulation's own error added, rad2.
@@ -80,6 +87,11 @@ class CellFitter:
         self.select_parts = evidence.parts_for("select") or self.fit_parts
         self._rippled: tuple[CellFit, RecordRipples] | None = None
         self._cell = evidence.cell_of(self.fit_parts)
+        self._count = np.bincount(self._cell, minlength=evidence.cells)
+        levels = [evidence.records.levels.index(evidence.parts[p].level) for p in self.fit_parts]
+        parts = np.bincount(levels, minlength=len(evidence.records.levels))
+        self._coherent = np.minimum(_COHERENT * np.repeat(parts, evidence.bands), self._count)
+        self._noise = evidence.noise.std_rad**2 if evidence.noise.known else 0.0
         self._floor = evidence.floor(self.fit_parts)
         self.groups = evidence.stretch_of(self.fit_parts)
         of_part = np.array([part.record for part in evidence.parts])
@@ -131,7 +143,7 @@ class CellFitter:
             before: the fit beside which it was screened.
             parent: the fit beside which it may be added.
         """
-        ratio = np.sqrt(before.variance / parent.variance)[self._cell]
+        ratio = self.weight(parent.variance) / self.weight(before.variance)
         costs = partial(self._costs, parent.variance)
         return screened.gain_beside(parent.solution, ratio, costs)
 
@@ -140,7 +152,8 @@ class CellFitter:
         best: CellFit | None = None
         kept: list[Space] = []
         begun = float(self._costs(parent.variance, parent.solution.residuals[None])[0])
-        rival = proposals[0][0] + _RIVAL * self._cell.size if proposals else begun
+        numbers = self._numbers(parent.variance).sum()
+        rival = proposals[0][0] + _RIVAL * numbers if proposals else begun
         for cost, space, point in proposals:
             if cost > min(begun - _LEAST_PROMISE, rival) or len(kept) == _STARTS:
                 break
@@ -154,6 +167,14 @@ class CellFitter:
             if best is None or self.gains(fit, best).sum() > 0.0:
                 best = fit
         return None if best is None else replace(best, acts=self.acted(best, effect))
+
+    def further(self, fit: CellFit) -> CellFit:
+        """Return a fit taken further from where it stands."""
+        known = fit.solution.jacobian
+        ended = self._reweighted(
+            fit.effects, fit.space, fit.solution.x, fit.variance, _REFIT_ROUNDS, known
+        )
+        return replace(ended, acts=fit.acts)
 
     def acted(self, fit: CellFit, effect: str) -> np.ndarray:
         """Return whether an effect moves each part that selects, beside what the fit leaves there.
@@ -200,13 +221,13 @@ class CellFitter:
         """Return the log-likelihood that one fit gains over another on each part that selects.
 
         With the variance of each band of each part unknown it is n/2 ln(left before/left after),
-        summed over bands of n numbers: no part counts by its size, and no outlier by its square.
+        summed over bands of n independent numbers: no part counts by its size, and no outlier by
+        its square.
 
         Returns:
             (parts,), nats.
         """
-        counts = self._counts
-        return 0.5 * np.sum(counts * np.log(before.left / after.left), axis=1)
+        return self._gains(after, before).sum(axis=1)
 
     def closed(self, after: CellFit, before: CellFit) -> float:
         """Return how much of what one fit leaves on unseen parts another closes, in one band.
@@ -215,9 +236,28 @@ class CellFitter:
         frequencies, where little of the motion is.
         """
         left = [np.sum(self._counts * fit.left, axis=0) for fit in (before, after)]
-        gained = self._counts.sum(axis=0) * np.log(left[0] / left[1])
-        most = int(np.argmax(gained))
+        most = int(np.argmax(self._gains(after, before).sum(axis=0)))
         return float(1.0 - left[1][most] / left[0][most])
+
+    def _gains(self, after: CellFit, before: CellFit) -> np.ndarray:
+        """Return the log-likelihood gained in each band of each part, (parts, bands), nats."""
+        noise = np.minimum(self._noise / np.minimum(before.left, after.left), 1.0)
+        numbers = _independent(noise, self._counts, np.minimum(_COHERENT, self._counts))
+        return 0.5 * numbers * np.log(before.left / after.left)
+
+    def _numbers(self, variance: np.ndarray) -> np.ndarray:
+        """Return how many independent numbers each cell holds on the fitted parts, (cells,)."""
+        noise = np.minimum(self._noise / variance, 1.0)
+        return _independent(noise, self._count, self._coherent)
+
+    def weight(self, variance: np.ndarray) -> np.ndarray:
+        """Return the weight of each error of the fit, (errors,), 1/rad.
+
+        Args:
+            variance: (cells,), of an error in each cell, rad2.
+        """
+        share = self._numbers(variance) / np.maximum(self._count, 1)
+        return np.sqrt(share / variance)[self._cell]
 
     def _left(self, model: Model) -> np.ndarray:
         parts = self.select_parts
@@ -231,8 +271,7 @@ class CellFitter:
 
     def _ripples(self, parent: CellFit) -> RecordRipples:
         if self._rippled is None or self._rippled[0] is not parent:
-            weight = 1.0 / np.sqrt(parent.variance[self._cell])
-            solution = parent.solution
+            weight, solution = self.weight(parent.variance), parent.solution
             ripples = RecordRipples(self.evidence, self.fit_parts, parent.model, weight, solution)
             self._rippled = parent, ripples
         return self._rippled[1]
@@ -246,7 +285,7 @@ class CellFitter:
         )
 
     def _residuals(self, variance: np.ndarray, models: Sequence[Model]) -> np.ndarray:
-        return self.evidence.errors(models, self.fit_parts) / np.sqrt(variance[self._cell])
+        return self.evidence.errors(models, self.fit_parts) * self.weight(variance)
 
     def _costs(self, variance: np.ndarray, errors: np.ndarray) -> np.ndarray:
         """Return twice the negative log-likelihood of errors whose variances by cell are unknown.
@@ -256,16 +295,16 @@ class CellFitter:
 
         Args:
             variance: (cells,), rad2.
-            errors: (models, errors), in its standard deviations.
+            errors: (models, errors), times its `weight`.
 
         Returns:
             (models,).
         """
         cells, least = self.evidence.cells, self._floor / variance
-        count = np.bincount(self._cell, minlength=cells)
+        numbers = self._numbers(variance)
         squares = np.array([np.bincount(self._cell, row**2, cells) for row in errors])
-        mean = np.maximum(squares / np.maximum(count, 1), least)
-        return np.log(mean) @ count
+        mean = np.maximum(squares / np.maximum(numbers, 1e-9), least)
+        return np.log(mean) @ numbers
 
     def _variance(self, errors: np.ndarray) -> np.ndarray:
         found = self.evidence.mean_squares(errors, self.fit_parts)
@@ -287,16 +326,25 @@ class CellFitter:
                 return self._residuals(variance, [space.model(point) for point in points])
 
             solution = solve(residuals, x, *space.bounds(), most_steps=steps, known=known)
-            errors = solution.residuals * np.sqrt(variance[self._cell])
-            before, variance, x = variance, self._variance(errors), solution.x
-            change = np.sqrt(before / variance)[self._cell]
-            known = solution.jacobian * change[:, None]
+            before = self.weight(variance)
+            errors = solution.residuals / before
+            variance, x = self._variance(errors), solution.x
+            known = solution.jacobian * (self.weight(variance) / before)[:, None]
         assert solution is not None and known is not None
-        ended = replace(
-            solution,
-            residuals=errors / np.sqrt(variance[self._cell]),
-            jacobian=known,
-            cost=float(np.sum(errors**2 / variance[self._cell])),
-        )
+        residuals = errors * self.weight(variance)
+        cost = float(residuals @ residuals)
+        ended = replace(solution, residuals=residuals, jacobian=known, cost=cost)
         model = space.model(x)
         return CellFit(effects, space, model, ended, variance, self._left(model))
+
+
+def _independent(noise: np.ndarray, lines: np.ndarray, coherent: np.ndarray) -> np.ndarray:
+    """Return how many independent numbers a sum of squares holds (Satterthwaite 1946).
+
+    Args:
+        noise: share of noise in it, which is independent on every line; the rest is a remainder's.
+        lines: number of lines.
+        coherent: number of independent numbers of the remainder.
+    """
+    found = 1.0 / (noise**2 / np.maximum(lines, 1) + (1.0 - noise) ** 2 / np.maximum(coherent, 1))
+    return np.where(lines > 0, found, 0.0)

@@ -85,7 +85,7 @@ class Screening:
 
         Args:
             other: where the other fit ended.
-            ratio: (errors,), standard deviations of the parent's errors over those of the other's.
+            ratio: (errors,), weights of the errors of the other's fit over those of the parent's.
             costs: what error vectors of the other fit cost.
         """
         inverse = np.linalg.pinv(other.jacobian, rcond=1e-6)

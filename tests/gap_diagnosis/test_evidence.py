@@ -21,7 +21,7 @@ from gap_diagnosis.model.simulated_rig import Model
 from gap_diagnosis.notes import at_limits
 from gap_diagnosis.outcome.diagnosis import Figure
 from gap_diagnosis.record_investigation import ASSUMED_SCATTER
-from gap_diagnosis.which.cell_fits import CellFitter
+from gap_diagnosis.which.cell_fits import CellFitter, _independent
 from gap_diagnosis.which.presence import at_its_bound, beyond_zero, cell_estimates, invariance
 from gap_diagnosis.which.stepwise import Gain, gain
 
@@ -230,3 +230,17 @@ def test_nothing_is_gained_by_an_effect_that_is_not_there():
         proposals = fitter.screening(refit, effect).proposals()
         fit = fitter.add(refit, effect, proposals) if proposals else None
         assert fit is None or not gain(fitter, fit, refit).present, effect
+
+
+def test_noise_counts_line_by_line_and_a_remainder_as_a_few_numbers():
+    """By the moments of chi-squares: independent noise on all lines, one factor for the rest."""
+    rng = np.random.default_rng(7)
+    lines, draws, modes = 60, 4000, 4
+    basis = np.linalg.qr(rng.standard_normal((lines, modes)))[0] * np.sqrt(lines / modes)
+    for share in (0.0, 0.1, 0.5, 1.0):
+        noise = np.sqrt(share) * rng.standard_normal((draws, lines))
+        rest = np.sqrt(1.0 - share) * rng.standard_normal((draws, modes)) @ basis.T
+        squares = np.mean((noise + rest) ** 2, axis=1)
+        seen = 2.0 * np.mean(squares) ** 2 / np.var(squares)
+        said = _independent(np.array(share), np.array(lines), np.array(modes))
+        assert said == pytest.approx(seen, rel=0.25)
