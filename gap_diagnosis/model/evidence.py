@@ -135,9 +135,10 @@ class Evidence:
     def lines_of(self, position: np.ndarray, index: int) -> np.ndarray:
         """Return the lines of the error of a simulated position of one record, (windows, lines)."""
         measured = self._measured[index][:, : self.lines]
+        most = _DIVERGED * np.abs(measured).max()
         if not np.isfinite(position).all():
-            return np.full(measured.shape, _DIVERGED * np.abs(measured).max())
-        return lapped(position, self.hop)[:, : self.lines] - measured
+            return np.full(measured.shape, most)
+        return np.clip(lapped(position, self.hop)[:, : self.lines] - measured, -most, most)
 
     def measured(self, which: Sequence[int]) -> np.ndarray:
         """Return the lines of the measured position on parts, (errors,), rad."""

@@ -5,10 +5,12 @@ noise: it is estimated from what the fit leaves on the fitted parts, and the fit
 (iteratively reweighted least squares, the maximum-likelihood estimate for unknown variances by
 cell). Models are compared by the log-likelihood of parts that no fit has seen.
 
-Noise is another number on every line. What a remainder leaves on the lines of one band is not: it
-comes from a few causes, such as friction that is a little other in this run. So a band counts for
-as many numbers as it has lines only so far as noise is what is left; else a thousand fine lines of
-one run outweigh an offset of all, and a fit follows the friction of that run.
+Noise is another number on every line. What a remainder leaves on the lines of one band need not
+be: friction that is a little other in this run, or a motor that stops a little beside its place,
+moves them all. Where one run fits and another selects, a band of a part counts for a few numbers
+only, else the fine lines of the fitted run outweigh an offset of all runs. Where one run does both,
+it counts for as many as its sums of squares say, which differ from part to part by sqrt(2/n) of
+their mean if n numbers are in them.
 """
 
 from __future__ import annotations
@@ -37,7 +39,7 @@ _STARTS = 2
 RIPPLES_TRIED = 3
 _RIVAL = 0.05  # an error: a second start that costs so much more than the first is not pursued
 _COHERENT = 4.0
-"""Independent numbers, at the most, that a remainder leaves in a band of a part."""
+"""Independent numbers, at the least, that a remainder leaves in a band of a part."""
 _ACTS = (
     0.1  # of what is left in a band of a part: an effect that moves it by less does not act there
 )
@@ -89,8 +91,10 @@ class CellFitter:
         self._cell = evidence.cell_of(self.fit_parts)
         self._count = np.bincount(self._cell, minlength=evidence.cells)
         levels = [evidence.records.levels.index(evidence.parts[p].level) for p in self.fit_parts]
-        parts = np.bincount(levels, minlength=len(evidence.records.levels))
-        self._coherent = np.minimum(_COHERENT * np.repeat(parts, evidence.bands), self._count)
+        self._fit_parts_of = np.bincount(levels, minlength=len(evidence.records.levels))
+        runs = [r.level for r in evidence.records.records]
+        self._alone = np.array([runs.count(level) == 1 for level in evidence.records.levels])
+        self._coherent = np.full((len(evidence.records.levels), evidence.bands), _COHERENT)
         self._noise = evidence.noise.std_rad**2 if evidence.noise.known else 0.0
         self._floor = evidence.floor(self.fit_parts)
         self.groups = evidence.stretch_of(self.fit_parts)
@@ -104,6 +108,7 @@ class CellFitter:
         shape = len(self.select_parts), evidence.bands
         self._counts = np.bincount(self._select_bins, minlength=shape[0] * shape[1]).reshape(shape)
         levels = [evidence.records.levels.index(evidence.parts[p].level) for p in self.select_parts]
+        self._select_levels = np.array(levels)
         self._select_floor = self._floor.reshape(-1, evidence.bands)[levels]
         records = evidence.records
         self.scales = Scales.of_record(
@@ -119,7 +124,34 @@ class CellFitter:
         space = Space(self.nominal, (), (), self.tolerance, self.scales)
         start = space.point(Model(self.nominal, {}))
         errors = self.evidence.errors([space.model(start)], self.fit_parts)[0]
-        return self._reweighted((), space, start, self._variance(errors), _REFIT_ROUNDS)
+        first = self._reweighted((), space, start, self._variance(errors), _REFIT_ROUNDS)
+        if not self._alone.any():
+            return first
+        self._coherent = self._coherence(first.solution.residuals / self.weight(first.variance))
+        return self.further(first)
+
+    def _coherence(self, errors: np.ndarray) -> np.ndarray:
+        """Return how many independent numbers are left in each band of a part of each level.
+
+        Args:
+            errors: on the fitted parts, (errors,), rad.
+
+        Returns:
+            (levels, bands), at least `_COHERENT`; that, where a level has several runs.
+        """
+        shape = self._coherent.shape
+        part, band = self.evidence.part_of(self.fit_parts), self._cell % shape[1]
+        bins = len(self.evidence.parts), shape[1]
+        place = part * bins[1] + band
+        squares = np.bincount(place, errors**2, bins[0] * bins[1]).reshape(bins)
+        level = np.array([self.evidence.records.levels.index(p.level) for p in self.evidence.parts])
+        found = np.full(shape, _COHERENT)
+        for k in range(shape[0]):
+            own = squares[[p for p in self.fit_parts if level[p] == k]]
+            if self._alone[k] and len(own) > 2:
+                spread = own.var(axis=0, ddof=1)
+                found[k] = 2.0 * own.mean(axis=0) ** 2 / np.maximum(spread, 1e-300)
+        return np.maximum(found, _COHERENT)
 
     def screening(self, parent: CellFit, effect: str) -> Screening:
         """Return what the starts of an effect promise beside a fit."""
@@ -242,13 +274,15 @@ class CellFitter:
     def _gains(self, after: CellFit, before: CellFit) -> np.ndarray:
         """Return the log-likelihood gained in each band of each part, (parts, bands), nats."""
         noise = np.minimum(self._noise / np.minimum(before.left, after.left), 1.0)
-        numbers = _independent(noise, self._counts, np.minimum(_COHERENT, self._counts))
+        coherent = np.minimum(self._coherent[self._select_levels], self._counts)
+        numbers = _independent(noise, self._counts, coherent)
         return 0.5 * numbers * np.log(before.left / after.left)
 
     def _numbers(self, variance: np.ndarray) -> np.ndarray:
         """Return how many independent numbers each cell holds on the fitted parts, (cells,)."""
         noise = np.minimum(self._noise / variance, 1.0)
-        return _independent(noise, self._count, self._coherent)
+        coherent = (self._fit_parts_of[:, None] * self._coherent).ravel()
+        return _independent(noise, self._count, np.minimum(coherent, self._count))
 
     def weight(self, variance: np.ndarray) -> np.ndarray:
         """Return the weight of each error of the fit, (errors,), 1/rad.

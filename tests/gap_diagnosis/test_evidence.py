@@ -244,3 +244,27 @@ def test_noise_counts_line_by_line_and_a_remainder_as_a_few_numbers():
         seen = 2.0 * np.mean(squares) ** 2 / np.var(squares)
         said = _independent(np.array(share), np.array(lines), np.array(modes))
         assert said == pytest.approx(seen, rel=0.25)
+
+
+def test_fine_lines_of_a_fitted_run_do_not_outweigh_an_offset_of_all_runs():
+    fitter = CellFitter(Evidence(records(runs=3, scatter=0.02), NOMINAL), NOMINAL, 0.1)
+    refit = fitter.refit()
+    left = np.full_like(refit.left, 1e4 * refit.left.max())
+    change = np.ones(left.shape[1])
+    change[0], change[-1] = 0.1, 1.5  # an offset is gone, the finest lines are worse
+    before, after = replace(refit, left=left), replace(refit, left=left * change)
+    assert fitter.gains(after, before).min() > 1.0
+
+
+def test_lines_of_a_single_run_count_as_its_parts_differ():
+    rng = np.random.default_rng(3)
+    one, three = (
+        CellFitter(Evidence(records(runs=runs), NOMINAL), NOMINAL, 0.1) for runs in (1, 3)
+    )
+    noise = rng.standard_normal(one._cell.size)
+    lines = one._counts[0]
+    seen = one._coherence(noise).mean(axis=0)[2:] / lines[2:]
+    assert seen == pytest.approx(np.ones(seen.size), rel=0.7)
+    factor = rng.standard_normal(len(one.evidence.parts))[one.evidence.part_of(one.fit_parts)]
+    assert np.unique(one._coherence(factor)) == [4.0]
+    assert np.unique(three._coherence(rng.standard_normal(three._cell.size))) == [4.0]
