@@ -365,9 +365,8 @@ class CellFitter:
             variance, x = self._variance(errors), solution.x
             known = solution.jacobian * (self.weight(variance) / before)[:, None]
         assert solution is not None and known is not None
-        residuals = errors * self.weight(variance)
-        cost = float(residuals @ residuals)
-        ended = replace(solution, residuals=residuals, jacobian=known, cost=cost)
+        left = errors * self.weight(variance)
+        ended = replace(solution, residuals=left, jacobian=known, cost=float(left @ left))
         model = space.model(x)
         return CellFit(effects, space, model, ended, variance, self._left(model))
 
