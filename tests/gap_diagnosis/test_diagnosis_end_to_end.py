@@ -110,7 +110,7 @@ FEW = {
     "one realization": ({"realizations": 1}, "one realization only"),
     "one level": ({"levels_rad": (1e-2,)}, "one level only"),
     "one period": ({"periods": 1}, "Only one period was kept"),
-    "no noise": ({"noise_rad": 0.0}, "show no noise"),
+    "no noise": ({"noise_rad": 0.0}, "no noise, so significance"),
 }
 
 
