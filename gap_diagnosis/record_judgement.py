@@ -41,6 +41,8 @@ FEWEST_PARTS = 6
 
 LEAST_PRESENT = 0.5
 """A cause that is there less often than not is not called present."""
+LEAST_IN_BAND = 0.5
+"""Of what is left in its best band, what a cause must close if its share of all is not certain."""
 _UNCERTAIN = 0.5  # of what a cause whose size is not certain would be present
 _DOUBTED = 0.7  # over what remains: a cause that closes such a share is there as often as not
 
@@ -81,9 +83,20 @@ class Tested:
     def passes_beside_size(self) -> bool:
         """Whether it passes all tests but that of its own size, which another cause may blur."""
         same = self.invariance_p is None or self.invariance_p >= LEAST_INVARIANCE_P
-        closes = self.share.low is None or not self.share.low <= 0.0  # NaN: one part says nothing
+        closes = self._closes
         least = LEAST_PRESENT if self.certain else _UNCERTAIN * LEAST_PRESENT
         return self.gain.present and same and closes and self.present >= least
+
+    @property
+    def _closes(self) -> bool:
+        """Whether some of the gap comes back without it; where one part decides, in its best band.
+
+        Where friction stops a motor is chance, and a few such places hold most of a squared error.
+        """
+        low, value = self.share.low, self.share.value
+        if low is None or not low <= 0.0:  # NaN: one part says nothing
+            return True
+        return value > 0.0 and self.in_band >= LEAST_IN_BAND
 
     @property
     def present(self) -> float:

@@ -147,7 +147,7 @@ def draw_waterfall(diagnosis: Diagnosis) -> Figure:
         axis.set_xlim(left=lowest)
     elif max(bar.end for bar in shown) < LEAST_PERCENT:
         axis.set_xlim(0.0, LEAST_PERCENT)
-        axis.xaxis.set_major_formatter(lambda x, _: f"{x:g}")
+    axis.xaxis.set_major_formatter(lambda x, _: f"{x:g}")
     axis.set_yticks(range(len(shown)), [bar.name for bar in shown])
     axis.grid(False, axis="y")
     axis.invert_yaxis()

@@ -189,6 +189,8 @@ def test_a_gap_that_is_nothing_but_rounding_is_shown_as_less_than_what_matters(f
     longest = max(x for trace in plot["data"] for x in trace["x"])
     assert longest == pytest.approx(100.0 * nominal, rel=0.01)
     axes = draw_waterfall(diagnosis).axes[0]
+    ticks = [axes.xaxis.get_major_formatter()(x, 0) for x in (0.01, 1.0, 10.0)]
+    assert ticks == ["0.01", "1", "10"]  # no mathematics in dollars, which nothing here sets
     assert axes.get_xlim()[1] >= 1e-3
 
 
