@@ -41,7 +41,7 @@ FEWEST_PARTS = 6
 
 LEAST_PRESENT = 0.5
 """A cause that is there less often than not is not called present."""
-LEAST_IN_BAND = 0.5
+LEAST_IN_BAND = 0.8
 """Of what is left in its best band, what a cause must close if its share of all is not certain."""
 _UNCERTAIN = 0.5  # of what a cause whose size is not certain would be present
 _DOUBTED = 0.7  # over what remains: a cause that closes such a share is there as often as not
