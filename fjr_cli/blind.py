@@ -127,9 +127,9 @@ def score(
         typer.Option(help="End a check here whose cases have not all got their verdicts."),
     ] = False,
     out: Annotated[
-        Path,
+        Path | None,
         typer.Option(metavar="FOLDER", help="Where the report of several checks goes."),
-    ] = Path("blind_report"),
+    ] = None,
 ) -> None:
     """Unseal and score a check whose verdicts are all there, or write its report again.
 
@@ -138,12 +138,20 @@ def score(
     from fjr_kit.installed import require_report_extra
 
     require_report_extra()
+    from fjr_kit.errors import InputError
     from fjr_kit.folder_lock import locked_folder
     from fjr_validation.blind.check import BlindCheck
     from fjr_validation.blind.report import score_check, score_together
 
     checks = [BlindCheck.open(folder) for folder in folders]
-    if len(checks) > 1:
+    if len(checks) > 1 and unfinished:
+        raise InputError("--unfinished ends one check; give each folder by itself first.")
+    if (out is not None) != (len(checks) > 1):
+        raise InputError(
+            "--out is where the report of several checks goes, and only theirs: a single check has "
+            "its own in its folder; give --out with two folders or more."
+        )
+    if out is not None:
         with locked_folder(out):
             typer.echo(score_together(checks, out))
         return

@@ -80,7 +80,8 @@ class Effect:
         ripple: whether it is periodic in the motor angle, so that `cycles_per_turn` is searched.
         scales: whether it scales the parameters of the bare plant, wholly or about one angle.
         contains: effects that it holds as limit cases, which explain what they can with less.
-        on_request: whether a diagnosis looks for it only if it is asked to.
+        on_request: whether a diagnosis looks for it only if it is asked to, or if a law that it
+            contains leads.
         of_bare_plant: whether it is the bare plant with other values, so that its kernel is the
             bare one.
         axis: which axes can have it; empty: flexible ones if it acts on transmission or link, else

@@ -14,7 +14,7 @@ def catalogue(nominal: Mapping[str, float], asked: Sequence[str] | None = None) 
     """Return the effects that a rig can have, or those of them that were asked for.
 
     A rigid axis has none of transmission and link, and friction is added only where there is none.
-    What is looked for on request only has to be asked for.
+    What is looked for on request only has to be asked for (or see `equivalents.holders`).
 
     Args:
         nominal: datasheet values of the base parameters.

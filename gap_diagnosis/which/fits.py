@@ -198,7 +198,7 @@ class Fitter:
         )  # fmt: skip
 
     def _costs_of_few(self, parent: Fit, few: Solution) -> Costs:
-        scale = parent.train_chi2 / few.cost
+        scale = parent.train_chi2 / few.cost if few.cost > 0.0 else 1.0  # nothing may be left
 
         def costs(errors: np.ndarray) -> np.ndarray:
             return scale * sums_of_squares(errors)

@@ -306,9 +306,9 @@ class Search:
         self._drop_holders(2)
 
     def _drop_holders(self, count: int) -> None:
-        """Drop explanations by a law of several parts where one of its parts does as well."""
+        """Drop explanations by a law that nobody asked for where one of its parts does as well."""
         for effects in [e for e in self._fits if len(e) == count]:
-            for held in (e for e in effects if fx.EFFECTS[e].on_request):
+            for held in (e for e in effects if e not in self._fitter.catalogue):
                 rest = [e for e in effects if e != held]
                 parts = (tuple(sorted((*rest, p))) for p in fx.EFFECTS[held].contains)
                 plain = [self._fits[p] for p in parts if p in self._fits]

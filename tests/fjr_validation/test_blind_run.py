@@ -149,6 +149,9 @@ def test_several_checks_make_one_report(state, tmp_path):
     folders = [str(check.folder) for check in checks]
     ran = CliRunner().invoke(app, ["blind", "score", *folders, "--out", str(tmp_path / "both")])
     assert ran.exit_code == 0, ran.output
+    for wrong in (folders, [folders[0], "--out", str(tmp_path)], [*folders, "--unfinished"]):
+        refused = CliRunner().invoke(app, ["blind", "score", *wrong])
+        assert refused.exit_code == 2 and "--" in refused.output
     text = (tmp_path / "both" / "report.md").read_text()
     assert "3 cases of 2 checks" in text and "Seed 203: 2 cases" in text
     assert "Seed 204: 1 case," in text and "ended after 1 of 2 cases" in text

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from gap_cases import SHORT, fitter_of, simulate_case, true_parameters
@@ -123,3 +125,13 @@ def test_what_has_not_converged_is_not_called_the_best():
     lost = fit(("delay",), 10.0, converged=False)
     note = unexplained(Attribution(refit, (lost,), refit, (), False), 100)
     assert "delay" not in note
+
+
+def test_a_rig_that_is_its_datasheet_without_noise_leaves_nothing_to_scale():
+    _, _, fitter = fitter_of(simulate_case({}, seed=3, off=0.0, noise_rad=0.0, **SHORT))
+    space = fitter.refit().space
+    exact = fitter.solve((), space, np.zeros(len(space.nominal)), most_steps=1)
+    nothing = replace(
+        exact, solution=replace(exact.solution, residuals=0.0 * exact.solution.residuals)
+    )
+    assert np.isfinite(fitter.screening(nothing, "torque_bias").gain)
