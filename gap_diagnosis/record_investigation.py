@@ -21,7 +21,7 @@ from .outcome.verdict_words import OUT_OF_TIME
 from .record_judgement import FEWEST_PARTS, Tested, judge_records, tested_causes
 from .which.catalogue import catalogue
 from .which.cell_fits import CellFit, CellFitter
-from .which.equivalents import partners
+from .which.equivalents import founded, partners
 from .which.estimates import moved_by_scatter, relative_scatter
 from .which.search_space import TOLERANCE
 from .which.stepwise import Found, Stepwise, gain, stands_for
@@ -232,8 +232,9 @@ def _alternatives(
     """
     best = found.best
     near = {*partners([tested.effect], set(names))}
+    others = sorted({*near, *found.alternatives.get(tested.effect, ())} - set(best.effects))
     tied = []
-    for effect in sorted({*near, *found.alternatives.get(tested.effect, ())} - set(best.effects)):
+    for effect in founded(others, tested.without.effects, fitter.nominal, names):
         proposals = fitter.screening(tested.without, effect).proposals()
         other = fitter.add(tested.without, effect, proposals) if proposals else None
         if other is None:

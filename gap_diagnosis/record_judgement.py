@@ -137,7 +137,7 @@ def tested_causes(
                 effect,
                 gain(fitter, fit, without, fitter.acted(fit, effect)),
                 without,
-                invariance(fitter, fit, effect),
+                invariance(fitter, fit, effect, scatter),
                 beyond_zero(effect, estimates) and not at_its_bound(fit, effect),
                 ledger.share(without.model, fit.model, refit.model),
                 fitter.closed(fit, without),

@@ -80,6 +80,8 @@ class Effect:
         ripple: whether it is periodic in the motor angle, so that `cycles_per_turn` is searched.
         scales: whether it scales the parameters of the bare plant, wholly or about one angle.
         contains: effects that it holds as limit cases, which explain what they can with less.
+        modifies: the effect that brings in what this one changes, so that a rig which lacks that
+            has nothing to change; empty if it stands by itself.
         on_request: whether a diagnosis looks for it only if it is asked to, or if a law that it
             contains leads.
         of_bare_plant: whether it is the bare plant with other values, so that its kernel is the
@@ -101,6 +103,7 @@ class Effect:
     ripple: bool = False
     scales: bool = False
     contains: tuple[str, ...] = ()
+    modifies: str = ""
     on_request: bool = False
     of_bare_plant: bool = False
     axis: Literal["", "both", "rigid"] = ""

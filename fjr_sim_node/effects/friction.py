@@ -71,6 +71,7 @@ FRICTION: tuple[Effect, ...] = (
         _ARMSTRONG,
         _stribeck("motor"),
         _STRIBECK_STARTS,
+        modifies="coulomb_friction",
     ),
     Effect(
         "stribeck_friction_link",
@@ -81,6 +82,7 @@ FRICTION: tuple[Effect, ...] = (
         _ARMSTRONG,
         _stribeck("link"),
         _STRIBECK_STARTS,
+        modifies="coulomb_friction",
     ),
     Effect(
         "asymmetric_friction",
@@ -101,6 +103,7 @@ FRICTION: tuple[Effect, ...] = (
         ),
         looks_like="constant torque",
         same_as="a torque bias while the motor slides, where only Coulomb friction differs",
+        modifies="coulomb_friction",
     ),
     Effect(
         "presliding_friction",
@@ -117,6 +120,7 @@ FRICTION: tuple[Effect, ...] = (
         ),
         # A side that starts below what is negligible never leaves it.
         ({"motor_rad": _SHORT, "link_rad": _SHORT},),
+        modifies="coulomb_friction",
     ),
     Effect(
         "lugre_friction",
@@ -140,6 +144,7 @@ FRICTION: tuple[Effect, ...] = (
         ),
         contains=("stribeck_friction_motor", "presliding_friction"),
         on_request=True,
+        modifies="coulomb_friction",
     ),
     Effect(
         "load_friction",
@@ -181,6 +186,7 @@ FRICTION: tuple[Effect, ...] = (
         ripple("amplitude_nm", "N m", 1e4, "the variation of Coulomb friction"),
         ripple_starts("amplitude_nm", 0.002),
         ripple=True,
+        modifies="coulomb_friction",
     ),
     Effect(
         "quadratic_friction",

@@ -261,6 +261,11 @@ class CellFitter:
         """
         return self._gains(after, before).sum(axis=1)
 
+    def left_of(self, after: CellFit, before: CellFit) -> float:
+        """Return how much of the squared error on unseen parts one fit leaves of another's."""
+        left = [float(np.sum(self._counts * fit.left)) for fit in (after, before)]
+        return left[0] / left[1]
+
     def closed(self, after: CellFit, before: CellFit) -> float:
         """Return how much of what one fit leaves on unseen parts another closes, in one band.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 from fjr_sim_node import effects as fx
 
@@ -29,6 +29,32 @@ def holders(found: Sequence[str], among: Sequence[str]) -> list[str]:
     """
     every = {other for effect in found for other in fx.holders(effect)} - set(among)
     return sorted(e for e in every if set(fx.EFFECTS[e].contains) <= set(among))
+
+
+def founded(
+    effects: Sequence[str], beside: Collection[str], nominal: Mapping[str, float],
+    among: Collection[str],
+) -> list[str]:  # fmt: skip
+    """Return those of some effects that have something to act on.
+
+    Where the datasheet has no Coulomb friction at all, a part of it that depends on direction,
+    angle or velocity would stand in for the whole: the whole goes first (the principle of
+    marginality: Nelder 1977, JRSS-A 140(1)).
+
+    Args:
+        effects: identifiers.
+        beside: identifiers of the explanation to which one of them is to be added.
+        nominal: bare parameters of the datasheet.
+        among: what is looked for; what brings in the whole counts only if it is.
+    """
+
+    def has_base(effect: str) -> bool:
+        base = fx.EFFECTS[effect].modifies
+        if not base or base in beside or base not in among:
+            return True
+        return any(nominal.get(p.adds_to) for p in fx.EFFECTS[base].parameters)
+
+    return [effect for effect in effects if has_base(effect)]
 
 
 def stands_for(effects: Sequence[str], others: Sequence[str]) -> bool:

@@ -154,21 +154,32 @@ def moved_by_scatter(
     Returns:
         (parameters,), standard deviations in units of the point.
     """
-    space, x, jacobian = fit.space, fit.solution.x, fit.solution.jacobian
-    change = np.zeros(x.size)
-    for k, name in enumerate((*space.nominal, *space.effects)):
-        if k < len(space.nominal):
-            change[k] = scatter.get(name, 0.0) if space.nominal[name] else 0.0
-        else:
-            change[k] = abs(x[k]) * scatter.get(fx.parameter(name).adds_to or "", 0.0)
+    jacobian, change = fit.solution.jacobian, deviations(fit, scatter)
     on = np.flatnonzero(change)
-    variance = np.zeros(x.size)
+    variance = np.zeros(change.size)
     if on.size:
         inverse = np.linalg.pinv(jacobian.T @ jacobian, rcond=1e-14)
         for run in np.unique(runs):
             rows = jacobian[runs == run]
             variance += np.sum((inverse @ (rows.T @ rows[:, on]) * change[on]) ** 2, axis=1)
     return np.sqrt(variance)
+
+
+def deviations(fit: Fit | CellFit, scatter: Mapping[str, float]) -> np.ndarray:
+    """Return the standard deviation from run to run of each parameter of a fit.
+
+    Args:
+        fit: an explanation.
+        scatter: see `moved_by_scatter`.
+
+    Returns:
+        (parameters,), in units of the point; zero for what does not scatter.
+    """
+    space, x = fit.space, fit.solution.x
+    own = [scatter.get(name, 0.0) if value else 0.0 for name, value in space.nominal.items()]
+    origins = [fx.parameter(name).adds_to for name in space.effects]
+    added = np.array([scatter.get(origin, 0.0) for origin in origins])
+    return np.concatenate([own, np.abs(x[len(own) :]) * added])
 
 
 def run_scatter(found: Mapping[str, Estimate], bags: Bags | None) -> dict[str, float]:

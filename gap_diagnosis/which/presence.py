@@ -17,7 +17,7 @@ from fjr_sim_node import effects as fx
 
 from ..outcome.diagnosis import Estimate
 from .cell_fits import CellFit, CellFitter
-from .estimates import linear_estimates, moved_by_scatter, standard_errors
+from .estimates import deviations, linear_estimates, moved_by_scatter, standard_errors
 
 LEAST_INVARIANCE_P = 0.01
 _SAME = 0.05  # relative: sizes that differ by no more are the same, since friction scatters
@@ -67,39 +67,48 @@ def at_its_bound(fit: CellFit, effect: str) -> bool:
     return False
 
 
-def invariance(fitter: CellFitter, fit: CellFit, effect: str) -> float | None:
+def invariance(
+    fitter: CellFitter, fit: CellFit, effect: str, scatter: Mapping[str, float]
+) -> float | None:
     """Return how often chance makes an effect's size differ so much between levels.
 
     The sizes are free at each level while all else is common, to first order; their covariance is
     robust to what is alike within a part (sandwich estimate by clusters). It rests on few parts, so
-    that the Wald statistic follows an F distribution, with the freedom of the level of fewest.
+    that the Wald statistic follows an F distribution, with the freedom of the level of fewest. What
+    scatters from run to run moves the size of a level that has few runs, and widens it.
+
+    Args:
+        fitter: that made the fit.
+        fit: an explanation with the effect.
+        effect: its identifier.
+        scatter: standard deviations of parameters from run to run, see `moved_by_scatter`.
 
     Returns:
         p-value of the Wald test that they are equal; None with one level.
     """
     evidence = fitter.evidence
     level = np.array([evidence.parts[p].level for p in fitter.groups])
-    levels = np.unique(level)
     columns = [
         len(fit.space.nominal) + k
         for k, name in enumerate(fit.space.effects)
         if name.startswith(f"{effect}.") and fx.parameter(name).role in ("size", "limit")
     ]
-    if levels.size < 2 or not columns:
+    if np.unique(level).size < 2 or not columns:
         return None
+    change = deviations(fit, scatter)
     least = 1.0
     for column in columns:
-        p = _equal(fit, column, level, levels, fitter.groups)
+        p = _equal(fit, column, level, fitter, change)
         if p is not None:
             least = min(least, p * len(columns))
     return min(least, 1.0)
 
 
 def _equal(
-    fit: CellFit, column: int, level: np.ndarray, levels: np.ndarray, groups: np.ndarray
+    fit: CellFit, column: int, level: np.ndarray, fitter: CellFitter, change: np.ndarray
 ) -> float | None:
-    jacobian, residuals = fit.solution.jacobian, fit.solution.residuals
-    own = jacobian[:, column]
+    jacobian, residuals, groups = fit.solution.jacobian, fit.solution.residuals, fitter.groups
+    own, levels = jacobian[:, column], np.unique(level)
     if not own.any():
         return None
     split = own[:, None] * (level[:, None] == levels)
@@ -111,6 +120,10 @@ def _equal(
     scores = np.array([wide[groups == g].T @ left[groups == g] for g in np.unique(groups)])
     count = len(scores)
     covariance = count / max(count - 1, 1) * inverse @ (scores.T @ scores) @ inverse
+    for run in np.unique(fitter.runs):
+        own_rows = fitter.runs == run
+        moved = inverse @ (wide[own_rows].T @ (jacobian[own_rows] * change))
+        covariance += moved @ moved.T
     k = levels.size
     values = fit.solution.x[column] + step[:k]
     spread = covariance[:k, :k] + np.diag(np.full(k, (_SAME * fit.solution.x[column]) ** 2))

@@ -26,7 +26,7 @@ from .attribution import (
     stands_out,
     tie_limit,
 )
-from .equivalents import SCALES, holders, partners, stands_for
+from .equivalents import SCALES, founded, holders, partners, stands_for
 from .estimates import sure
 from .fits import Fit, Fitter
 from .harmonics import with_second_harmonics
@@ -124,6 +124,8 @@ class Search:
         least = min(parent.train_chi2, *rivals) if rivals else parent.train_chi2
         settled = self._settled(len(parent.effects) + 1, near)
         effects = [e for e in effects if tuple(sorted((*parent.effects, e))) not in settled]
+        names, nominal = self._fitter.catalogue, self._fitter.nominal
+        effects = founded(effects, parent.effects, nominal, names)
         hopeful, screened = self._screenings(parent, effects, most)
         proposals = {effect: screened[effect].proposals() for effect in hopeful}
         ordered = sorted(hopeful, key=lambda effect: proposals[effect][0][0])[:most]

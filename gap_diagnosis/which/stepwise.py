@@ -16,12 +16,13 @@ from scipy import stats
 from fjr_sim_node import effects as fx
 
 from .cell_fits import CellFit, CellFitter
-from .equivalents import holders, partners
+from .equivalents import founded, holders, partners
 from .screening import Screening
 
 MOST_CAUSES = 4
 _PROPOSED, _FITTED = 7, 5
 _AGAIN = 8  # effects without ripple that are screened beside a cause
+_OUTDATED = 0.1  # of the squared error that is left: then what was screened before is too far
 NOTHING_LEFT = 2.0
 """Mean squared error over noise below which noise explains what is left."""
 LEAST_GAIN = 1.0
@@ -159,13 +160,16 @@ class Stepwise:
 
     def _extended(self, parent: CellFit) -> list[CellFit]:
         """Return the parent with each promising effect more, best on unseen parts first."""
-        effects = [e for e in self._effects if e not in parent.effects]
+        names, nominal = self._effects, self._fitter.nominal
+        effects = [e for e in names if e not in parent.effects]
+        effects = founded(effects, parent.effects, nominal, names)
         screened = self._screened(parent, effects)
         hopeful = sorted(screened, key=lambda e: -screened[e].gain)[:_PROPOSED]
         proposals = {e: screened[e].proposals() for e in hopeful}
         ordered = sorted((e for e in hopeful if proposals[e]), key=lambda e: proposals[e][0][0])
         chosen = ordered[:_FITTED]
-        alike = {*partners(chosen[:2], set(effects)), *holders(chosen[:2], self._effects)}
+        held = founded(holders(chosen[:2], names), parent.effects, nominal, names)
+        alike = {*partners(chosen[:2], set(effects)), *held}
         for effect in sorted(alike - set(chosen)):
             if effect not in proposals:
                 again = screened.get(effect) or self._fitter.screening(parent, effect)
@@ -183,15 +187,17 @@ class Stepwise:
         """Return screenings beside a fit: of all effects the first time, then of those that count.
 
         What a seed changes hardly depends on causes beside it, so the first changes say which
-        effects may gain beside others. Ripples are sought anew, since their period depends on what
-        is left.
+        effects may gain beside others; where a cause has closed most of the error, that is not so
+        near any more, and all are screened anew. So are ripples, whose period depends on what is
+        left.
         """
-        if self._first is not None:
+        anew = self._first is None or self._fitter.left_of(parent, self._first[0]) < _OUTDATED
+        if self._first is not None and not anew:
             before, screened = self._first
             promise = {
                 e: self._fitter.promise(screened[e], before, parent)
                 for e in effects
-                if not fx.EFFECTS[e].ripple
+                if e in screened and not fx.EFFECTS[e].ripple
             }
             best = sorted(promise, key=lambda e: -promise[e])[:_AGAIN]
             effects = [e for e in effects if e in best or e not in promise]
@@ -199,7 +205,7 @@ class Stepwise:
         for effect in effects:
             self._progress(f"{' + '.join((*parent.effects, effect))}, screened")
             found[effect] = self._fitter.screening(parent, effect)
-        if self._first is None:
+        if anew:
             self._first = parent, found
         return found
 

@@ -1,0 +1,91 @@
+"""Rigs whose datasheet holds inertias and stiffness alone: all friction is to be found at once."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_evidence import NOMINAL, records
+
+from gap_diagnosis.model.evidence import Evidence
+from gap_diagnosis.record_investigation import RecordInvestigation, investigate_records
+from gap_diagnosis.which.cell_fits import CellFitter
+from gap_diagnosis.which.equivalents import founded
+from gap_diagnosis.which.presence import LEAST_INVARIANCE_P, invariance
+from gap_diagnosis.which.stepwise import Stepwise
+
+BARE = {**NOMINAL, "fs": 0.0, "fsm": 0.0, "fv": 0.0, "fvm": 0.0}
+LOOKED_FOR = (
+    "coulomb_friction", "viscous_friction", "quadratic_friction", "asymmetric_friction",
+    "torque_bias",
+)  # fmt: skip
+BIAS_NM = 6.0
+
+
+@pytest.fixture(scope="module")
+def found() -> RecordInvestigation:
+    made = records({"torque_bias.torque_nm": BIAS_NM}, runs=3, scatter=0.03, seconds=6.0)
+    return investigate_records(made, BARE, effects=LOOKED_FOR)
+
+
+def test_the_whole_friction_is_named_and_no_part_of_it_in_its_place(found):
+    named = [{cause.effect, *cause.others} for cause in found.diagnosis.causes]
+    assert [own for own in named if "coulomb_friction" in own] == [{"coulomb_friction"}]
+    assert any("viscous_friction" in own for own in named)
+    assert any("torque_bias" in own for own in named)
+    sizes = {n: v for cause in found.diagnosis.causes for n, v in cause.parameters.items()}
+    both = sizes["coulomb_friction.motor_nm"].value + sizes["coulomb_friction.link_nm"].value
+    assert both == pytest.approx(NOMINAL["fs"] + NOMINAL["fsm"], rel=0.1)
+
+
+def test_what_changes_friction_waits_for_it_only_where_the_datasheet_has_none():
+    every = [*LOOKED_FOR, "position_friction"]
+    waiting = ["asymmetric_friction", "position_friction"]
+    assert founded(every, (), BARE, every) == [e for e in every if e not in waiting]
+    assert founded(every, ("coulomb_friction",), BARE, every) == every
+    assert founded(every, (), {**BARE, "fs": 0.1}, every) == every
+    assert founded(waiting, (), BARE, waiting) == waiting  # nobody looks for the whole
+
+
+def test_all_effects_are_screened_anew_once_a_cause_has_closed_most_of_the_error():
+    made = records({"torque_bias.torque_nm": BIAS_NM}, runs=2)
+    fitter = CellFitter(Evidence(made, NOMINAL), NOMINAL, 0.1)
+    refit = fitter.refit()
+    fit = fitter.add(refit, "torque_bias", fitter.screening(refit, "torque_bias").proposals())
+    others = [f"effect_{k}" for k in range(12)]
+    looked: list[str] = []
+
+    class Noted:
+        gain = 1.0
+
+        def gain_beside(self, *_):
+            return 1.0
+
+    search = Stepwise(fitter, others)
+    fitter.screening = lambda _, effect: looked.append(effect) or Noted()
+    assert fitter.left_of(fit, refit) < 0.1
+    search._first = refit, dict.fromkeys(others, Noted())
+    assert set(search._screened(fit, others)) == set(looked) == set(others)
+
+
+@pytest.mark.parametrize("scatter", [0.0, 0.05])
+def test_friction_that_scatters_may_differ_between_levels_of_one_run(scatter):
+    """Friction of the one run of a level is a third off: too much, unless it scatters."""
+    made = records(runs=1, seconds=6.0)
+    fitter = CellFitter(Evidence(made, BARE), BARE, 0.1)
+    fit = fitter.refit()
+    for effect in ("coulomb_friction", "viscous_friction"):
+        fit = fitter.add(fit, effect, fitter.screening(fit, effect).proposals())
+    level = np.array([fitter.evidence.parts[p].level for p in fitter.groups])
+    columns = [
+        len(fit.space.nominal) + k
+        for k, name in enumerate(fit.space.effects)
+        if name.startswith("coulomb_friction.")
+    ]
+    own = fit.solution.jacobian[:, columns] @ fit.solution.x[columns]
+    moved = fit.solution.residuals - 0.3 * own * (level == 1)
+    fit = replace(fit, solution=replace(fit.solution, residuals=moved))
+    friction = dict.fromkeys(("fs", "fsm", "fv", "fvm"), scatter)
+    p = invariance(fitter, fit, "coulomb_friction", friction)
+    assert p > 3.0 * LEAST_INVARIANCE_P if scatter else p < LEAST_INVARIANCE_P
