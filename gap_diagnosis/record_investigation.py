@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 from fjr_kit.errors import InputError
 from fjr_records.records import Record, RecordSet
@@ -239,11 +240,18 @@ def _alternatives(
         other = fitter.add(tested.without, effect, proposals) if proposals else None
         if other is None:
             continue
-        behind = gain(fitter, best, fitter.further(other))
-        as_well = stands_for(behind, tested.gain.mean)
-        if as_well or (effect in near and not behind.present):
+        as_well = partial(_does_as_well, fitter, best, tested, effect in near)
+        if as_well(other) or as_well(fitter.further(other)):
             tied.append(effect)
     return tied
+
+
+def _does_as_well(
+    fitter: CellFitter, best: CellFit, tested: Tested, near: bool, other: CellFit
+) -> bool:
+    """Tell whether unseen parts do not tell a fit with another effect from the best."""
+    behind = gain(fitter, best, other)
+    return stands_for(behind, tested.gain.mean) or (near and not behind.present)
 
 
 def _notes(evidence: Evidence, found: Found) -> list[str]:

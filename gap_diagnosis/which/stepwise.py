@@ -19,7 +19,7 @@ from .cell_fits import CellFit, CellFitter
 from .equivalents import founded, holders, partners
 from .screening import Screening
 
-MOST_CAUSES = 4
+MOST_CAUSES = 6
 _PROPOSED, _FITTED = 7, 5
 _AGAIN = 8  # effects without ripple that are screened beside a cause
 _OUTDATED = 0.1  # of the squared error that is left: then what was screened before is too far
