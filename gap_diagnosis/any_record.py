@@ -29,6 +29,10 @@ BESIDE = (
     "No explanation of the steady periods leaves noise alone, so the whole runs were searched for "
     "causes beside a remainder."
 )
+UNSTEADY = (
+    "The periods do not repeat as steady ones do, so the whole runs were searched for causes "
+    "beside a remainder, which a change within a run is a part of."
+)
 
 
 def diagnose(
@@ -120,7 +124,8 @@ def investigate_any(
 
     Steady periods are compared period by period, which shows the least effects. Where no
     explanation leaves noise alone, their runs are searched as records for causes beside a
-    remainder.
+    remainder; so are those of periods that do not repeat, whose verdict stays where nothing is
+    found.
     """
     begun = time.monotonic()
     if isinstance(recorded, RecordedExperiment):
@@ -128,27 +133,30 @@ def investigate_any(
             recorded, nominal, tolerance=tolerance, effects=effects,
             budget_s=STEADY_SHARE * budget_s, progress=progress,
         )  # fmt: skip
-        if steady.diagnosis.verdict != "unexplained":
+        unsteady = steady.gates.only_unsteady
+        if steady.diagnosis.verdict != "unexplained" and not unsteady:
             return steady
         left = max(budget_s - (time.monotonic() - begun), 0.0)
         whole = investigate_records(
             recorded.as_records(), nominal, tolerance=tolerance, effects=effects, budget_s=left,
             progress=progress,
         )  # fmt: skip
-        return _beside(whole, steady)
+        if unsteady and not whole.diagnosis.causes:
+            return steady
+        return _beside(whole, steady, UNSTEADY if unsteady else BESIDE)
     return investigate_records(
         recorded, nominal, tolerance=tolerance, effects=effects, budget_s=budget_s,
         progress=progress,
     )  # fmt: skip
 
 
-def _beside(whole: RecordInvestigation, steady: Investigation) -> RecordInvestigation:
+def _beside(whole: RecordInvestigation, steady: Investigation, why: str) -> RecordInvestigation:
     """Return what was found beside a remainder, with what only steady periods tell."""
     known = steady.diagnosis
     told = whole.diagnosis.model_copy(
         update={
             "bags": known.bags or whole.diagnosis.bags,
-            "notes": [BESIDE, *_once(known.notes, whole.diagnosis.notes)],
+            "notes": [why, *_once(known.notes, whole.diagnosis.notes)],
         }
     )
     return replace(whole, diagnosis=told)

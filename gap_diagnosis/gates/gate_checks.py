@@ -40,11 +40,13 @@ class Gate(Check):
         hint: the verdict that a failure suggests.
         bags: what changes from bag to bag, where this gate compares bags.
         telling: whether a reader must see the sentence although the gate passed.
+        of_periods: whether it asks for periods that repeat, which records need not do.
     """
 
     hint: Hint = "bad_data"
     bags: Bags | None = None
     telling: bool = False
+    of_periods: bool = False
 
 
 @dataclass(frozen=True)
@@ -73,6 +75,11 @@ class GateReport:
         """The gates that do not pass."""
         return failed(self.gates)
 
+    @property
+    def only_unsteady(self) -> bool:
+        """Whether nothing is wrong but that periods do not repeat."""
+        return bool(self.failures) and all(gate.of_periods for gate in self.failures)
+
 
 def check_gates(
     recorded: RecordedExperiment, nominal: Model, noise: NoiseLevels | None = None
@@ -91,19 +98,14 @@ def check_gates(
     if not whole.passed:
         return GateReport((whole,), ())
     drift = _stationary_over_periods(recorded)
-    settled = _settled(recorded)
-    periodic = _periodic(recorded)
-    if not drift.passed:  # a drift doesn't repeat or settle either
-        settled, periodic = (
-            gate.model_copy(update={"hint": drift.hint}) for gate in (settled, periodic)
-        )
+    # A drift does not repeat or settle either.
+    same = {"of_periods": True} | ({} if drift.passed else {"hint": drift.hint})
+    steady = (_periodic(recorded), _settled(recorded), drift)
     gates = [
         whole,
         _one_grid(recorded),
         _reference(recorded),
-        periodic,
-        settled,
-        drift,
+        *(gate.model_copy(update=same) for gate in steady),
     ]
     if recorded.repeatable:
         gates += [_controller(recorded), _discretisation(recorded, nominal)]
