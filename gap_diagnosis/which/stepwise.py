@@ -21,6 +21,7 @@ from .screening import Screening
 
 MOST_CAUSES = 6
 _PROPOSED, _FITTED = 7, 5
+_POLISHED = 2  # leading fits of a step that are taken further
 _AGAIN = 8  # effects without ripple that are screened beside a cause
 _OUTDATED = 0.1  # of the squared error that is left: then what was screened before is too far
 NOTHING_LEFT = 2.0
@@ -181,7 +182,19 @@ class Stepwise:
             fit = self._fitter.add(parent, effect, proposals[effect])
             if fit is not None:
                 fits.append(fit)
+        fits = self._ranked(fits, parent)
+        leading = [self._settled(fit) for fit in fits[:_POLISHED]]
+        return self._ranked([*leading, *fits[_POLISHED:]], parent)
+
+    def _ranked(self, fits: Sequence[CellFit], parent: CellFit) -> list[CellFit]:
         return sorted(fits, key=lambda fit: -self._gain(fit, parent).mean)
+
+    def _settled(self, fit: CellFit) -> CellFit:
+        """Return a fit that leads, taken further where its few steps have not reached its end."""
+        if fit.solution.converged:
+            return fit
+        self._progress(f"{' + '.join(fit.effects)}, further")
+        return self._fitter.further(fit)
 
     def _screened(self, parent: CellFit, effects: Sequence[str]) -> dict[str, Screening]:
         """Return screenings beside a fit: of all effects the first time, then of those that count.
