@@ -23,7 +23,7 @@ from gap_diagnosis.outcome.diagnosis import Figure
 from gap_diagnosis.record_investigation import ASSUMED_SCATTER
 from gap_diagnosis.which.cell_fits import CellFitter, _independent
 from gap_diagnosis.which.presence import at_its_bound, beyond_zero, cell_estimates, invariance
-from gap_diagnosis.which.stepwise import Gain, gain
+from gap_diagnosis.which.stepwise import Gain, Stepwise, gain
 
 RATE, NOISE = 500.0, 2e-5
 LAW = pd_filtered.CONTROLLER.check({"sample_rate_hz": RATE})
@@ -159,6 +159,18 @@ def test_an_effect_must_repeat_only_where_it_acts():
     assert not fit.acts[levels == 0].any() and fit.acts[levels == 1].all()
     where_it_acts = gain(fitter, fit, refit, fit.acts)
     assert where_it_acts.present and where_it_acts.p == 0.5 ** np.sum(levels == 1)
+
+
+def test_a_leading_fit_is_taken_to_its_end_before_it_is_compared():
+    limit = {"torque_saturation.limit_nm": 60.0}
+    evidence = Evidence(records(limit, runs=2, seconds=5.0, scatter=0.02), NOMINAL)
+    fitter = CellFitter(evidence, NOMINAL, 0.1)
+    refit = fitter.refit()
+    proposals = fitter.screening(refit, "torque_saturation").proposals()
+    assert not fitter.add(refit, "torque_saturation", proposals).solution.converged
+    (fit,) = Stepwise(fitter, ["torque_saturation"])._extended(refit)
+    assert fit.solution.converged
+    assert fit.model.effects["torque_saturation.limit_nm"] == pytest.approx(60.0, rel=0.01)
 
 
 @pytest.mark.parametrize("bias", [0.05, 0.1])

@@ -1,0 +1,75 @@
+"""Periods that do not repeat: the whole runs are searched, and the verdict stays if nothing is."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from gap_cases import NOISE_RAD, SHORT, simulate_case
+
+from controller_node import pd_filtered
+from fjr_records.periodic import RecordedExperiment
+from fjr_sim_node import effects as fx
+from fjr_sim_node.plant import PLANT, coefficients
+from fjr_sim_node.simulation.closed_loop import simulate
+from gap_diagnosis.any_record import UNSTEADY, investigate_any
+from gap_diagnosis.investigation import investigate
+from gap_diagnosis.record_investigation import RecordInvestigation
+
+WARMING = {"nonstationary.friction_per_s": -0.02}
+LAG_S = 1e-3
+KNOWN = ("actuator_lag", "torque_bias", "encoder_eccentricity")
+
+
+def warming_anew(effects: dict[str, float]) -> RecordedExperiment:
+    """Return an experiment each run of which starts cold: friction falls within it, not beyond."""
+    case = simulate_case(effects, seed=4, realizations=3, **SHORT)
+    rng = np.random.default_rng(8)
+    law = pd_filtered.CONTROLLER.check({})
+    made = []
+    for r in case.recorded.realizations:
+        run = simulate(
+            r.reference.ravel(),
+            r.experiment.sample_rate_hz,
+            coefficients(case.truth.plant),
+            pd_filtered.coefficients(law),
+            NOISE_RAD * rng.standard_normal(r.position.size),
+            fx.coefficients({**effects, **WARMING}),
+            0.0,
+        )
+        shape = r.position.shape
+        made.append(
+            replace(r, position=run.position.reshape(shape), torque=run.torque.reshape(shape))
+        )
+    return RecordedExperiment("warming", tuple(made))
+
+
+def test_a_cause_is_named_beside_a_drift_within_each_run():
+    recorded = warming_anew({"actuator_lag.time_constant_s": LAG_S})
+    steady = investigate(recorded, PLANT.defaults(), effects=KNOWN)
+    assert steady.diagnosis.verdict == "nonstationary" and steady.gates.only_unsteady
+    found = investigate_any(recorded, PLANT.defaults(), effects=KNOWN)
+    assert isinstance(found, RecordInvestigation)
+    diagnosis = found.diagnosis
+    assert diagnosis.effects == ["actuator_lag"] and diagnosis.notes[0] == UNSTEADY
+    assert any("drifts within bags" in note for note in diagnosis.notes)
+    size = diagnosis.causes[0].parameters["actuator_lag.time_constant_s"]
+    assert size.value == pytest.approx(LAG_S, rel=0.1)
+
+
+def test_a_drift_beside_which_nothing_is_found_stays_the_verdict():
+    diagnosis = investigate_any(warming_anew({}), PLANT.defaults(), effects=KNOWN).diagnosis
+    assert diagnosis.verdict == "nonstationary" and not diagnosis.causes
+
+
+def test_a_record_that_is_damaged_is_not_searched():
+    recorded = warming_anew({})
+    first = recorded.realizations[0]
+    torque = first.torque.copy()
+    torque[1, 5] += 1.0
+    bad = replace(
+        recorded, realizations=(replace(first, torque=torque), *recorded.realizations[1:])
+    )
+    found = investigate_any(bad, PLANT.defaults(), effects=KNOWN)
+    assert not found.gates.only_unsteady and found.diagnosis.verdict == "bad_data"
