@@ -96,6 +96,18 @@ def log_axis(axis: Axes, low: float, high: float) -> None:
     axis.set_xlim(low, high)
 
 
+def log_values(axis: Axes) -> None:
+    """Make y logarithmic with plain numbers at the ticks."""
+    axis.set_yscale("log")
+    plain_values(axis)
+
+
+def plain_values(axis: Axes) -> None:
+    """Write plain numbers at the greater ticks of y; the style draws no formulas."""
+    axis.yaxis.set_major_formatter(FuncFormatter(lambda y, _: f"{y:g}"))
+    axis.yaxis.set_minor_formatter(NullFormatter())
+
+
 def legend(axis: Axes, *others: Axes) -> None:
     """Put a legend right of `axis`, with what is drawn there and in `others`, each label once."""
     entries: dict[str, Artist] = {}

@@ -43,6 +43,10 @@ LONGEST_S = 300.0
 """Of all records together, what is played at the most (s)."""
 
 
+_MAY_BE_UNSURE = 2
+SURE = 0.8
+"""How surely a cause beyond the two that gain most must be present."""
+
 _SEARCH_SHARE = 0.6
 """Of the budget for the search; the tests of what it found take about as long as one more step."""
 
@@ -208,10 +212,10 @@ def _kept(
     while steps[-1].effects:
         progress(f"tests of {' + '.join(steps[-1].effects)}")
         tested = tested_causes(fitter, steps[-1], steps[0], scatter)
-        failed = [t for t in tested if not t.passed]
+        failed = [t for t in tested if not t.passed] or _guesses(tested)
         if not failed:
             break
-        blurred = any(t.passes_beside_size for t in failed)
+        blurred = any(t.passes_beside_size and not t.certain for t in failed)
         weakest = min(tested if blurred else failed, key=lambda t: t.gain.mean)
         before = [fit for fit in steps if weakest.effect not in fit.effects]
         last = weakest.without
@@ -220,7 +224,30 @@ def _kept(
         if same and fitter.gains(last, before[-1]).sum() > 0.0:
             steps[-1] = last
         tested = []
+    if tested and any(len(fit.effects) != count for count, fit in enumerate(steps)):
+        steps = [steps[0], *_one_by_one(fitter, steps[-1], tested)]
     return replace(found, steps=steps), tested
+
+
+def _one_by_one(fitter: CellFitter, fit: CellFit, tested: Sequence[Tested]) -> list[CellFit]:
+    """Return a fit reached cause after cause, what gains most first: each has one cause more."""
+    order = [t.effect for t in sorted(tested, key=lambda t: -t.gain.mean)]
+    without = {t.effect: t.without for t in tested}
+    fits = [fit]
+    for effect in order[:0:-1]:
+        fewer = without[effect] if fits[0] is fit else fitter.without(fits[0], effect)
+        fits.insert(0, fewer)
+    return [replace(one, effects=tuple(order[:count])) for count, one in enumerate(fits, 1)]
+
+
+def _guesses(tested: Sequence[Tested]) -> list[Tested]:
+    """Return the causes beyond the two that gain most of which one is not sure.
+
+    Each step tries the whole catalogue on what is left; the more steps, the likelier one of them
+    finds what resembles a part of the remainder.
+    """
+    further = sorted(tested, key=lambda t: -t.gain.mean)[_MAY_BE_UNSURE:]
+    return [t for t in further if t.present < SURE]
 
 
 def _alternatives(

@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fjr_kit.figure_style import EVEN, EXCITED, ODD, STYLE, WIDTH_IN, legend, save
+from fjr_kit.figure_style import EVEN, EXCITED, ODD, STYLE, WIDTH_IN, legend, log_axis, save
 
 from .answers import WORLDS, World
 from .outcome import CLEAR, Outcome
@@ -68,7 +68,7 @@ def _named(outcomes: Sequence[Outcome], stem: Path) -> None:
         ]
         _points(axis, world, pairs, _SIZES)
     axis.axvline(CLEAR, color="0.6", linewidth=0.8, linestyle="--")
-    axis.set_xscale("log")
+    log_axis(axis, 0.5, 1.2 * _LAST_SIZE)
     axis.set_ylim(-0.02, 1.02)
     axis.set_xlabel("shows, over detection limit (closed) or remainder")
     axis.set_ylabel("share named")

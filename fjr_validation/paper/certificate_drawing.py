@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from fjr_kit.figure_style import log_values
 from fjr_kit.plots import LOG, layout
 
 from . import drawing
@@ -87,7 +88,7 @@ def figure(found: Any) -> Figure:
         axis.plot(found.frequency_hz[keep], ratio[keep], ".", color=color, label=name)
         for limit in found.limits[name]:
             axis.axhline(limit, color=color, ls=":", lw=0.8)
-    drawing.log_values(axis)
+    log_values(axis)
     axis.set_yticks([0.5, 0.7, 1.0, 1.4, 2.0])
     axis.set(xlabel="frequency (Hz)", ylabel="empirical / predicted variance", xlim=(0, 50))
     axis.legend(loc="upper right")

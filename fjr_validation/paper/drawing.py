@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, NullFormatter
 from numpy.typing import ArrayLike
 
 from fjr_kit.figure_style import log_axis
@@ -60,13 +59,6 @@ def amplitude_axis(axis: Axes, low: float = 1e-3, high: float = 1e-1) -> None:
     """Scale x for amplitudes."""
     log_axis(axis, low, high)
     axis.set_xlabel("amplitude of a line (rad)")
-
-
-def log_values(axis: Axes) -> None:
-    """Scale y logarithmically with plain numbers at the ticks."""
-    axis.set_yscale("log")
-    axis.yaxis.set_major_formatter(FuncFormatter(lambda y, _: f"{y:g}"))
-    axis.yaxis.set_minor_formatter(NullFormatter())
 
 
 def decibel_power(values: np.ndarray) -> np.ndarray:

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from bla_analyzer.compare.metrics import LOW_LINES_HZ, squared_error_db
-from fjr_kit.figure_style import SIGMA
+from fjr_kit.figure_style import SIGMA, log_values
 from fjr_kit.plots import layout
 from fjr_kit.tasks import Arrays
 
@@ -138,7 +138,7 @@ def _figure(found: Mapping[str, np.ndarray], settings: Settings) -> Figure:
         axis.plot(settings.amplitudes, values[:, 0], "o-", color=COLORS[case], label=NAMES[case])
     axis.axhline(TARGET_DB2, color="#7a7f87", ls=":", lw=0.8)
     drawing.amplitude_axis(axis)
-    drawing.log_values(axis)
+    log_values(axis)
     axis.set_ylabel("measured to predicted BLA (dB²)", labelpad=0)
     axis.legend(loc="lower center")
     return figure

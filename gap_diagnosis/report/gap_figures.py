@@ -11,7 +11,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from fjr_kit.figure_style import (
     EVEN,
@@ -24,6 +23,8 @@ from fjr_kit.figure_style import (
     frequency_axis,
     legend,
     log_axis,
+    log_values,
+    plain_values,
     stacked_axes,
 )
 
@@ -81,13 +82,8 @@ def draw_sigma_maps(maps: Mapping[str, ResidualMap], signal: Signal = "position"
     if mesh is not None:
         bar = figure.add_axes((0.88, bottom, 0.018, top - bottom))
         figure.colorbar(mesh, cax=bar, label=f"residual / noise ({SIGMA})", extend="both")
-        _plain_ticks(bar)
+        plain_values(bar)
     return figure
-
-
-def _plain_ticks(axis: Axes) -> None:
-    axis.yaxis.set_major_formatter(FuncFormatter(lambda y, _: f"{y:g}"))
-    axis.yaxis.set_minor_formatter(NullFormatter())
 
 
 def _draw_kind(axis: Axes, found: ResidualMap, kind: str, signal: Signal):
@@ -152,8 +148,7 @@ def draw_sigma_lines(found: ResidualMap, signal: Signal = "position") -> Figure:
                     at, part.sigma[row, chosen], marker, label=label if filled else None, **style
                 )
         axis.axhline(1.0, color=NOISE, lw=0.8)
-        axis.set_yscale("log")
-        _plain_ticks(axis)
+        log_values(axis)
         axis.set_ylabel(f"{SIGMA} at {found.amplitudes_rad[row]:.2g} rad")
     frequency_axis(axes, found.frequency_hz[1:])
     low, high = axes[-1].get_xlim()

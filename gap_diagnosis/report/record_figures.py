@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 from matplotlib.figure import Figure
 
-from fjr_kit.figure_style import EXCITED, NOISE, ODD, SIGMA, WIDTH_IN, legend
+from fjr_kit.figure_style import EXCITED, NOISE, ODD, SIGMA, WIDTH_IN, legend, log_values
 
 from ..how_far.record_comparison import RecordComparison
 from ..outcome.cause_words import two_digits
@@ -50,7 +50,7 @@ def draw_bands(found: Sequence[RecordComparison], *, known: bool) -> Figure:
             axis.plot(np.arange(errors.size), errors, "o-", color=color, label=label)
         if known:
             axis.axhline(1.0, color=NOISE, lw=0.8, ls="--", label="noise")
-        axis.set_yscale("log")
+        log_values(axis)
         ends = level.edges_hz
         axis.set_xticks(range(ends.size - 1), [f"to {two_digits(end)}" for end in ends[1:]])
         axis.set_ylabel(f"level {level.level}: error / {SIGMA if known else 'motion'}")

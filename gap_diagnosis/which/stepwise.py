@@ -19,7 +19,7 @@ from .cell_fits import CellFit, CellFitter
 from .equivalents import founded, holders, partners
 from .screening import Screening
 
-MOST_CAUSES = 6
+MOST_CAUSES = 5
 _PROPOSED, _FITTED = 7, 5
 _POLISHED = 2  # leading fits of a step that are taken further
 _AGAIN = 8  # effects without ripple that are screened beside a cause

@@ -1,0 +1,34 @@
+"""Logarithmic axes of figures have plain numbers: the style draws no formulas."""
+
+from __future__ import annotations
+
+import matplotlib as mpl
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from fjr_kit.figure_style import STYLE, log_axis, log_values
+
+
+def written(axis) -> list[str]:
+    FigureCanvasAgg(axis.figure).draw()
+    labels = [*axis.get_xticklabels(which="both"), *axis.get_yticklabels(which="both")]
+    return [label.get_text() for label in labels if label.get_text()]
+
+
+@pytest.mark.parametrize("scaled", [lambda axis: log_axis(axis, 0.5, 24.0), log_values])
+def test_ticks_of_logarithmic_axes_are_plain_numbers(scaled):
+    with mpl.rc_context(STYLE):
+        axis = Figure().add_subplot()
+        axis.plot([0.6, 20.0], [0.03, 400.0])
+        scaled(axis)
+        texts = written(axis)
+    assert "10" in texts and not any("$" in text for text in texts), texts
+
+
+def test_the_bare_scale_would_show_a_formula():
+    with mpl.rc_context(STYLE):
+        axis = Figure().add_subplot()
+        axis.plot([0.6, 20.0], [0.03, 400.0])
+        axis.set_yscale("log")
+        assert any("$" in text for text in written(axis))

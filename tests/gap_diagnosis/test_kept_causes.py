@@ -1,0 +1,70 @@
+"""Which causes of a search are kept, and the steps in which they are shown."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+
+import pytest
+from test_evidence import NOMINAL, SCATTER, records
+
+from gap_diagnosis import record_judgement
+from gap_diagnosis.model.evidence import Evidence
+from gap_diagnosis.record_investigation import SURE, _guesses, _kept, _one_by_one
+from gap_diagnosis.which.cell_fits import CellFitter
+from gap_diagnosis.which.stepwise import Found, Gain
+
+CAUSES = {"torque_bias.torque_nm": 4.0, "delay.time_s": 1e-3}
+
+
+@pytest.fixture(scope="module")
+def searched():
+    """Return a fitter, the refit, the fit of a needless and two true causes, and one without it."""
+    fitter = CellFitter(Evidence(records(CAUSES, runs=2, scatter=0.02), NOMINAL), NOMINAL, 0.1)
+    fits = [fitter.refit()]
+    for effect in ("stribeck_friction_motor", "delay", "torque_bias"):
+        proposals = fitter.screening(fits[-1], effect).proposals()
+        space, point = proposals[0][1:]
+        begun = fitter._reweighted(
+            (*fits[-1].effects, effect), space, point, fits[-1].variance, (6, 4)
+        )
+        fits.append(begun)
+    return fitter, fits
+
+
+def test_what_is_left_after_a_first_cause_was_taken_out_is_shown_cause_after_cause(searched):
+    fitter, fits = searched
+    found, tested = _kept(fitter, Found(fits), SCATTER, lambda _: None)
+    assert {t.effect for t in tested} == set(found.best.effects) == {"delay", "torque_bias"}
+    assert [len(fit.effects) for fit in found.steps] == [0, 1, 2]
+    first, both = (fit.model.effects for fit in found.steps[1:])
+    stronger = max(tested, key=lambda t: t.gain.mean).effect
+    assert found.steps[1].effects == (stronger,) and found.steps[2].effects[0] == stronger
+    assert {name.split(".")[0] for name in first} == {stronger}
+    assert both["torque_bias.torque_nm"] == pytest.approx(4.0, rel=0.05)
+    assert both["delay.time_s"] == pytest.approx(1e-3, rel=0.05)
+
+
+def test_steps_end_at_the_fit_itself(searched):
+    fitter, fits = searched
+    tested = record_judgement.tested_causes(fitter, fits[3], fits[0], SCATTER)
+    steps = _one_by_one(fitter, fits[3], tested)
+    assert [len(fit.effects) for fit in steps] == [1, 2, 3]
+    assert steps[-1].model is fits[3].model
+    assert all(set(a.effects) < set(b.effects) for a, b in itertools.pairwise(steps))
+
+
+def test_a_third_cause_must_be_sure(searched):
+    fitter, fits = searched
+    tested = record_judgement.tested_causes(fitter, fits[3], fits[0], SCATTER)
+    gains = [Gain(mean, mean, 1.0, 1e-4) for mean in (30.0, 20.0, 10.0)]
+    sure = [replace(t, gain=g, in_band=0.99) for t, g in zip(tested, gains, strict=True)]
+    guess = replace(sure[2], in_band=0.5, share=replace_share(sure[2].share))
+    assert guess.present < SURE
+    assert _guesses([*sure[:2], guess]) == [guess]
+    assert _guesses([guess, replace(sure[0], gain=gains[0])]) == []
+
+
+def replace_share(share):
+    """Return a share that is small and certain."""
+    return share.model_copy(update={"value": 0.02, "low": 0.01, "high": 0.03})
