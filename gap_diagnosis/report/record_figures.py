@@ -45,7 +45,8 @@ def draw_bands(found: Sequence[RecordComparison], *, known: bool) -> Figure:
     axes = [figure.add_subplot(grid[row]) for row in range(rows)]
     for axis, level in zip(axes, found, strict=True):
         for order, (name, errors) in enumerate(level.errors.items()):
-            label = {"nominal": "nominal", "refit": "refit"}.get(name, f"+ {explanation([name])}")
+            last = name.split(" + ")[-1]
+            label = last if name in ("nominal", "refit") else f"+ {explanation([last])}"
             color = _STEPS[min(order, len(_STEPS) - 1)]
             axis.plot(np.arange(errors.size), errors, "o-", color=color, label=label)
         if known:
