@@ -204,7 +204,8 @@ def _kept(
     """Take out, one at a time, the causes that do not pass the tests beside the others.
 
     A cause whose size alone is not certain may be blurred by another one: then that goes which
-    gains least of all. Where too little is held out, no cause is kept.
+    gains least of all. Of those that pass, what is not sure goes as well, but for the two that gain
+    most. Where too little is held out, no cause is kept.
     """
     if len(fitter.evidence.parts_for("select")) < FEWEST_PARTS:
         return replace(found, steps=found.steps[:1]), []

@@ -68,7 +68,7 @@ def _named(outcomes: Sequence[Outcome], stem: Path) -> None:
         ]
         _points(axis, world, pairs, _SIZES)
     axis.axvline(CLEAR, color="0.6", linewidth=0.8, linestyle="--")
-    log_axis(axis, 0.5, 1.2 * _LAST_SIZE)
+    log_axis(axis, min(0.5, 0.8 * axis.dataLim.minposx), 1.2 * _LAST_SIZE)
     axis.set_ylim(-0.02, 1.02)
     axis.set_xlabel("shows, over detection limit (closed) or remainder")
     axis.set_ylabel("share named")
