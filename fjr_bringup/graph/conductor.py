@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import rclpy
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
@@ -30,6 +30,7 @@ _POLL_S = 0.01
 _START_S = 90.0  # the very first start compiles the physics
 _ANSWER_S = 1.0
 _TRY_S = 10.0
+_SILENCE_S = 4.0  # a node of a stalled realization that answers nothing for so long hangs
 _STALL_S = 8.0  # Fast DDS by default repeats a message after 3 s
 _PREPARATION_S = 5e-6  # for each sample: the nodes make reference and noise before the first one
 
@@ -125,7 +126,7 @@ class Conductor:
         if time.monotonic() > until:
             self._blame(suspect)
 
-    def _blame(self, node: str) -> None:
+    def _blame(self, node: str) -> NoReturn:
         words = self._processes.named(node).last_words()
         raise InputError(f"The {node} node hangs{words}")
 
@@ -196,7 +197,7 @@ class Conductor:
             self._processes.raise_if_dead()
             if time.monotonic() > until:
                 if not self._stands_still(progress):
-                    self._blame(self._who_hangs())
+                    self._blame_who_hangs()
                 until = time.monotonic() + _STALL_S
             time.sleep(_POLL_S)
 
@@ -229,7 +230,18 @@ class Conductor:
         self._node.destroy_client(client)
         return future.result() if future and future.done() else None
 
-    def _who_hangs(self) -> str:
+    def _blame_who_hangs(self) -> NoReturn:
+        """Blame the node that answers nothing; the one that owes a message if all of them answer.
+
+        A node that stops while it sends has reached some of its readers: to the recorder it looks
+        as if another one owed the answer.
+        """
+        owes = self._who_owes()
+        for node in (owes, *(each for each in self._nodes if each != owes)):
+            self._answers(node, time.monotonic() + _SILENCE_S)
+        self._blame(owes)
+
+    def _who_owes(self) -> str:
         """Return the node that owes the next message, by the newest stamp of each signal."""
         reference, position, torque = self._recorder.newest_ns
         if not self._recorder.described:  # it follows the controller's answer to the reference

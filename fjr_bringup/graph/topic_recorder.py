@@ -59,6 +59,7 @@ def record_topics(
             progress.say(f"Recording in ROS domain {domain}; {reach()}.")
             types = _types(node, topics, progress, interruption)
             recorded = [_Topic(node, name, kind, store) for name, kind in types.items()]
+            _wait_for_match(recorded, interruption)
             progress.say(f"Recording {', '.join(types)}. Ctrl-C ends the bag.")
             try:
                 _write(partial.path, recorded, duration_s, progress, interruption, store)
@@ -115,6 +116,11 @@ class _Topic:
         )
         self.messages = 0
 
+    @property
+    def matched(self) -> bool:
+        """Whether what a publisher sends from now on arrives here."""
+        return self._subscription.get_publisher_count() > 0
+
     def take(self) -> list[tuple[int, bytes]]:
         """Return what has arrived: time of arrival in ns, and the serialized message."""
         taken = []
@@ -125,6 +131,14 @@ class _Topic:
                 taken.append((info.get("received_timestamp") or time.time_ns(), data))
         self.messages += len(taken)
         return taken
+
+
+def _wait_for_match(topics: Sequence[_Topic], interruption: Interruption) -> None:
+    """Wait until the subscriptions hear their publishers, some of which may have left again."""
+    until = time.monotonic() + _DISCOVERY_S
+    while not all(each.matched for each in topics) and time.monotonic() < until:
+        interruption.raise_if_asked()
+        time.sleep(_POLL_S)
 
 
 def _readable(offers: Sequence[TopicEndpointInfo]) -> QoSProfile:
@@ -164,7 +178,9 @@ def _write(
         for each in topics
     ]
     first: float | None = None
-    while not interruption.asked:
+    ends = False
+    while not ends:
+        ends = interruption.asked  # and what has arrived until then is taken
         arrived = [
             (stamp, channel, data)
             for topic, channel in zip(topics, channels, strict=True)

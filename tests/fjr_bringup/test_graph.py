@@ -14,6 +14,7 @@ from processes import Starter, marked_processes, node_pid, wait_for
 from ros_domain import Peer
 
 from fjr_bringup.campaign.plan import Campaign
+from fjr_bringup.graph.conductor import Conductor
 from fjr_bringup.graph.recorder import Recorder
 from fjr_interface.bags.reader import audit
 from fjr_interface.topics import NODES, SIGNAL_DEPTH
@@ -100,6 +101,16 @@ def test_a_dead_or_hung_node_is_named_and_all_others_end(
         assert "its last lines:" in message and "Level 0, realization 0" in message
     assert marked_processes(mark) == []
     assert contents(folder) == {} and not list(folder.glob(".level_*"))
+
+
+def test_a_node_that_answers_is_not_blamed_for_one_that_hangs(domain, mark, tmp_path, monkeypatch):
+    """A node that stops while it sends has reached the recorder and not those who answer it."""
+    monkeypatch.setattr(Conductor, "_who_owes", lambda _: "controller")
+    folder = tmp_path / "campaign"
+    saboteur = Saboteur(mark, folder, "simulator", signal.SIGSTOP)
+    with pytest.raises(InputError, match=r"^The simulator node hangs"):
+        in_graph(campaign(base=0.05, excitation={"f_min_hz": 1.0, "f_max_hz": 40.0}), folder)
+    saboteur.join()
 
 
 def test_a_node_that_ends_at_its_start_is_named_with_what_it_said(domain, tmp_path, monkeypatch):

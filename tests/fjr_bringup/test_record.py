@@ -92,6 +92,7 @@ def test_ctrl_c_keeps_whole_periods_and_a_late_recorder_waits(start, domain: int
 
 
 def test_topics_of_another_rig_are_recorded_with_their_qos(start, peer, tmp_path: Path):
+    from rclpy.duration import Duration
     from rclpy.qos import QoSProfile, ReliabilityPolicy
     from sensor_msgs.msg import JointState
     from std_msgs.msg import Float64
@@ -105,10 +106,11 @@ def test_topics_of_another_rig_are_recorded_with_their_qos(start, peer, tmp_path
     peer.spin_until(
         lambda: states.get_subscription_count() and loads.get_subscription_count(), "the recorder"
     )
+    recorder.wait_for_text("Ctrl-C ends the bag")
     for k in range(1, 101):
         states.publish(joint_state(k * 2_000_000, position=k / 8, effort=-1.0))
         loads.publish(Float64(data=float(k)))
-    recorder.wait_for_text("Ctrl-C ends the bag")
+    assert loads.wait_for_all_acked(Duration(seconds=30))
     peer.spin_until(lambda: (bag.parent / ".bag.partial").exists(), "the bag")
     assert recorder.interrupt() == 0
     assert recorder.output.splitlines()[-1] == str(bag)
