@@ -10,6 +10,9 @@ _SHARES = (0.15, 0.25, 0.4, 0.5, 0.6, 0.7, 0.75, 0.8, 0.85, 0.9, 0.94, 0.97, 1.0
 """Torque limits over the greatest commanded torque: which peaks are clipped changes from one to
 the next, and a knee is felt below its limit."""
 
+_LINE_SHARES = (0.3, 0.45, 0.6, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95, 1.0, 1.05)
+"""Stall torques over the one whose line the record just reaches."""
+
 _PERIODS = (0.1, 0.5, 3.0, 10.0, 30.0)
 
 DRIVE: tuple[Effect, ...] = (
@@ -81,11 +84,11 @@ DRIVE: tuple[Effect, ...] = (
         "torque-speed line of a direct-current motor, Krause et al. 2013, ch. 2",
         (
             EffectParameter("stall_nm", math.inf, "N m", "Greatest torque at rest; .inf: no limit",
-                            1e-6, role="limit"),
+                            1e-6, role="limit", falls_to="no_load_rad_s"),
             EffectParameter("no_load_rad_s", 100.0, "rad/s", "Motor speed at which no torque is "
                             "left in its direction", 1e-3, 1e6, fit=(0.5, 100.0)),
         ),
-        ({"stall_nm": (0.5, 0.7, 0.85, 1.0, 1.4, 2.5), "no_load_rad_s": (2.5, 5.0, 12.0)},),
+        ({"stall_nm": _LINE_SHARES, "no_load_rad_s": (3.0, 5.0, 8.0, 14.0)},),
         contains=("torque_saturation",),
     ),
     Effect(

@@ -33,6 +33,9 @@ class EffectParameter(Parameter):
             stiff, relative.
         absolute: whether fits take it in its unit whatever the record, as what belongs to one turn.
         of_link: whether it belongs to the link alone, which a rigid axis does not have.
+        falls_to: parameter of its effect, a speed at which this limit has fallen to zero: then its
+            starts are relative to the limit that the record just reaches with that start. Empty
+            for all others.
         adds_to: bare parameter that it adds to, for datasheets that lack it: fits free it only
             where that is zero. Empty for all others.
     """
@@ -42,6 +45,7 @@ class EffectParameter(Parameter):
     negligible: float = 0.0
     absolute: bool = False
     of_link: bool = False
+    falls_to: str = ""
     adds_to: str = ""
 
     def fit_bounds(self, scale: float) -> tuple[float, float]:

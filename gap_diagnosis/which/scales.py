@@ -18,6 +18,8 @@ from fjr_sim_node import effects as fx
 _QUARTER_CYCLE = 0.2  # rad of rms motion: about a quarter of what is then travelled to and fro
 _FINE, _COARSE = 0.065, 0.5  # rad of rms motion from one number of ripples to the next
 _MOST_CYCLES = 400
+_SPEED_BANDS = 40
+_NEAR_NO_LOAD = 0.05
 
 
 @dataclass(frozen=True)
@@ -34,6 +36,7 @@ class Scales:
         inertia_kg_m2: motor and link together.
         peak_torque_nm: greatest torque; a drive that saturates does so below it, and far below
             where the loop then asks for more.
+        corners: pairs of motor speed (rad/s) and greatest torque (N m) in its direction.
     """
 
     torque_nm: float
@@ -44,6 +47,7 @@ class Scales:
     band_hz: float
     inertia_kg_m2: float
     peak_torque_nm: float
+    corners: tuple[tuple[float, float], ...] = ()
 
     @classmethod
     def of_record(
@@ -75,6 +79,12 @@ class Scales:
             band_hz=band_hz,
             inertia_kg_m2=nominal["jm"] + nominal.get("j", 0.0),
             peak_torque_nm=max(float(np.abs(u).max()) for u in torques) or 1.0,
+            corners=_corners(
+                np.concatenate(speeds),
+                np.concatenate(
+                    [u[span // 2 :][: v.size] for u, v in zip(torques, speeds, strict=True)]
+                ),
+            ),
         )
 
     @classmethod
@@ -117,6 +127,16 @@ class Scales:
             "kg m2": self.inertia_kg_m2,
         }[parameter.unit]
 
+    def stall_nm(self, no_load_rad_s: float) -> float:
+        """Return the stall torque whose line, which falls to zero at a speed, the record reaches.
+
+        Args:
+            no_load_rad_s: that speed; what the record does near it or beyond does not count.
+        """
+        shares = [(torque, 1.0 - speed / no_load_rad_s) for speed, torque in self.corners]
+        reached = [torque / share for torque, share in shares if share > _NEAR_NO_LOAD]
+        return max([self.peak_torque_nm, *reached])
+
     def bounds(self, name: str) -> tuple[float, float]:
         """Return the least and the greatest value that a fit may give a parameter."""
         parameter = fx.parameter(name)
@@ -144,6 +164,18 @@ class Scales:
         near = low + step * np.arange(min(_MOST_CYCLES, int((high - low) / step) + 1))
         whole = np.arange(np.ceil(near[-1]) + 1.0, high)[:_MOST_CYCLES]
         return np.concatenate([near, whole])
+
+
+def _corners(speeds: np.ndarray, torques: np.ndarray) -> tuple[tuple[float, float], ...]:
+    """Return the greatest torque in the direction of motion within each of some bands of speed."""
+    driven = speeds * torques > 0.0
+    if not driven.any():
+        return ()
+    speeds, torques = np.abs(speeds[driven]), np.abs(torques[driven])
+    band = (speeds / (speeds.max() * (1.0 + 1e-12)) * _SPEED_BANDS).astype(int)
+    order = np.lexsort((torques, band))
+    last = order[np.flatnonzero(np.diff(band[order], append=_SPEED_BANDS))]
+    return tuple(zip(speeds[last].tolist(), torques[last].tolist(), strict=True))
 
 
 def _rms(signals: Sequence[np.ndarray]) -> float:

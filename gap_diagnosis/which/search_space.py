@@ -84,10 +84,24 @@ def starts(
                 inside = np.clip(values, *scales.bounds(name))
                 grid[name] = tuple(dict.fromkeys(inside.tolist()))
         points += [
-            dict(zip(grid, values, strict=True)) for values in itertools.product(*grid.values())
+            _on_lines(dict(zip(grid, values, strict=True)), scales)
+            for values in itertools.product(*grid.values())
         ]
     shown = [p for p in points if any(p.get(name) for name in entry.size_names)]
     return list({tuple(point.items()): point for point in shown}.values())
+
+
+def _on_lines(point: dict[str, float], scales: Scales) -> dict[str, float]:
+    """Return a starting point whose falling limits are measured by those that the record reaches.
+
+    Alone, either number of such a limit may be anything: it shows where both together cut.
+    """
+    for name, value in point.items():
+        if speed := fx.parameter(name).falls_to:
+            no_load = point[f"{name.split('.', 1)[0]}.{speed}"]
+            reached = value / scales.of(name) * scales.stall_nm(no_load)
+            point[name] = float(np.clip(reached, *scales.bounds(name)))
+    return point
 
 
 def beside(model: Model, seed: Mapping[str, float]) -> Model:

@@ -93,7 +93,8 @@ def test_scales_are_those_of_the_record():
     noisy = motion + 1e-4 * np.random.default_rng(1).standard_normal(t.size)
     torque = 3.0 * np.cos(2.0 * np.pi * 5.0 * t)
     nominal = {"jm": 0.2, "j": 0.3, "k0": 100.0}
-    scales = Scales.of_record([noisy[:4000], noisy[4000:]], [torque], rate, band, nominal)
+    halves = [torque[:4000], torque[4000:]]
+    scales = Scales.of_record([noisy[:4000], noisy[4000:]], halves, rate, band, nominal)
     assert scales.angle_rad == pytest.approx(0.2 / math.sqrt(2.0), rel=1e-3)
     assert scales.velocity_rad_s == pytest.approx(2.0 * math.pi / math.sqrt(2.0), rel=0.02)
     assert scales.torque_nm == pytest.approx(3.0 / math.sqrt(2.0), rel=1e-3)
@@ -102,6 +103,22 @@ def test_scales_are_those_of_the_record():
     assert scales.inertia_kg_m2 == 0.5 and scales.peak_torque_nm == pytest.approx(3.0, rel=1e-3)
     rigid = Scales.of_record([noisy], [torque], rate, band, {"jm": 0.5})
     assert rigid.deflection_rad == rigid.angle_rad and rigid.inertia_kg_m2 == 0.5
+
+
+def test_a_stall_torque_is_that_of_the_line_which_the_record_reaches():
+    rate, band = 1000.0, 20.0
+    t = np.arange(8000) / rate
+    w = 2.0 * np.pi * 5.0
+    torque = 3.0 * np.cos(w * t) + 1.0 * np.sin(w * t)  # drives with 3 at speed 0.2 w, 1 at rest
+    scales = Scales.of_record([0.2 * np.sin(w * t)], [torque], rate, band, {"jm": 0.5})
+    phase = np.linspace(0.0, 2.0 * np.pi, 100000)
+    speed, driven = 0.2 * w * np.cos(phase), 3.0 * np.cos(phase) + np.sin(phase)
+    for no_load in (1.5 * 0.2 * w, 4.0 * 0.2 * w):
+        exact = np.max(np.abs(driven) / (1.0 - np.maximum(np.sign(driven) * speed, 0.0) / no_load))
+        assert scales.stall_nm(no_load) == pytest.approx(exact, rel=0.04)
+    assert scales.stall_nm(1e9) == pytest.approx(scales.peak_torque_nm, rel=1e-6)
+    still = Scales.of_record([0.0 * t], [torque], rate, band, {"jm": 0.5})
+    assert still.stall_nm(1.0) == still.peak_torque_nm
 
 
 def test_the_paper_s_rig_starts_where_its_effects_usually_are():

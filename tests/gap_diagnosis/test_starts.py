@@ -52,6 +52,22 @@ def test_a_limit_is_found_wherever_it_clips(share, knee):
     assert fit.model.effects["torque_saturation.knee"] == pytest.approx(knee, abs=0.05)
 
 
+@pytest.mark.parametrize(
+    ("share", "speeds"), [(0.75, 1.3), (0.7, 1.6), (0.6, 2.0), (0.85, 2.5), (0.8, 4.0)]
+)
+def test_a_limit_that_falls_with_the_speed_is_found_wherever_it_cuts(share, speeds):
+    """The line is a share of the one that the record just reaches, at some times its speed."""
+    bare = fitter_of(simulate_case({}, seed=3, **SHORT))[2].scales
+    no_load = speeds * max(speed for speed, _ in bare.corners)
+    stall = share * bare.stall_nm(no_load)
+    truth = {
+        "torque_speed_limit.stall_nm": stall, "torque_speed_limit.no_load_rad_s": no_load
+    }  # fmt: skip
+    fit, left = fitted(truth, "torque_speed_limit", more=True)
+    assert fit.converged and left < 1.5
+    assert fit.model.effects["torque_speed_limit.stall_nm"] == pytest.approx(stall, rel=0.02)
+
+
 def test_an_eccentric_encoder_is_followed_along_its_valley():
     truth = {"encoder_eccentricity.amplitude_rad": 0.12, "encoder_eccentricity.phase_rad": -0.6}
     fit, left = fitted(truth, "encoder_eccentricity", more=True)
