@@ -77,6 +77,7 @@ MJCF: Mapping[str, Treatment] = {
     "backlash": _native("dead band of the tendon's spring"),
     "piecewise_stiffness": _native("two springs, one with a dead band, which has k1"),
     "asymmetric_stiffness": _native("a spring for each direction"),
+    "cubic_stiffness": _native("third coefficient of the tendon's stiffness"),
     "hysteresis": _native("LuGre friction of the tendon, without damping"),
     "transmission_damping": _native("damping of the tendon"),
     "kinematic_error": _refused("a tendon is linear in the angles"),
@@ -103,7 +104,10 @@ URDF: Mapping[str, Treatment] = {
     "transmission_stiffness": _equivalent("a rigid joint"),
     "torque_saturation": _native("effort of limit; a knee is left out, so that it clips"),
     **dict.fromkeys(
-        ("backlash", "piecewise_stiffness", "asymmetric_stiffness", "hysteresis"),
+        (
+            *("backlash", "piecewise_stiffness", "asymmetric_stiffness", "cubic_stiffness"),
+            "hysteresis",
+        ),
         _refused(_DEFLECTION),
     ),
     "transmission_damping": _refused(_DEFLECTION),
@@ -140,6 +144,7 @@ CONTROL: Mapping[str, Treatment] = {
     "backlash": _equivalent(f"stiffness: {_AT_RECORD}"),
     "piecewise_stiffness": _equivalent(f"stiffness: {_AT_RECORD}"),
     "asymmetric_stiffness": _equivalent(f"stiffness: {_AT_RECORD}"),
+    "cubic_stiffness": _equivalent(f"stiffness: {_AT_RECORD}"),
     "transmission_damping": _native("damping between the bodies"),
     "extra_mode": _native("a third body"),
     "transmission_stiffness": _native("stiffness between two bodies"),
@@ -172,7 +177,7 @@ SIMSCAPE: Mapping[str, Treatment] = {
     **dict.fromkeys(
         (
             *("viscous_friction", "quadratic_friction", "presliding_friction", "backlash"),
-            *("piecewise_stiffness", "asymmetric_stiffness", "hysteresis"),
+            *("piecewise_stiffness", "asymmetric_stiffness", "cubic_stiffness", "hysteresis"),
             *("transmission_damping", "kinematic_error", "extra_mode", "gravity"),
             *("transmission_stiffness", "torque_bias", "cogging", "actuator_lag"),
             *("torque_speed_limit", "dead_band", "torque_constant_ripple", "torque_gain"),

@@ -47,6 +47,7 @@ MODERATE = {
     "backlash": {"half_gap_rad": 1e-3},
     "piecewise_stiffness": {"zone_rad": 2e-3, "soft_ratio": 0.4},
     "asymmetric_stiffness": {"relative": 0.2},
+    "cubic_stiffness": {"stiffness_nm_rad3": 2e6},
     "hysteresis": {"torque_nm": 3.0, "displacement_rad": 1e-3},
     "transmission_damping": {"nm_s_rad": 2.0},
     "kinematic_error": {

@@ -58,7 +58,7 @@ def odd_values(effect: effects.Effect) -> dict[str, float]:
 
 def test_every_effect_of_the_catalogue_is_tested_here():
     assert set(MODERATE) == set(IDENTIFIERS)
-    assert len(IDENTIFIERS) == 33
+    assert len(IDENTIFIERS) == 34
 
 
 @pytest.mark.parametrize("identifier", IDENTIFIERS)

@@ -483,6 +483,15 @@ def test_friction_that_the_datasheet_lacks_is_the_plant_with_that_friction(on, b
         assert with_effect.energy() == with_value.energy()
 
 
+def test_a_cubic_stiffness_that_the_datasheet_lacks_is_the_plant_with_that_k1():
+    torque = 30.0 * np.random.default_rng(5).standard_normal(300)
+    with_effect = Rig({"k1": 0.0}, named("cubic_stiffness", stiffness_nm_rad3=3e6))
+    with_value = Rig({"k1": 3e6})
+    assert np.array_equal(with_effect.play(torque), with_value.play(torque))
+    assert with_effect.energy() == with_value.energy() > 0.0
+    assert not np.allclose(with_value.play(torque), Rig({"k1": 0.0}).play(torque), rtol=1e-3)
+
+
 def test_a_transmission_that_yields_is_the_flexible_plant():
     torque = 30.0 * np.random.default_rng(5).standard_normal(300)
     on = named(

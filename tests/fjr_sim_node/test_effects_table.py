@@ -46,7 +46,7 @@ def test_every_parameter_is_read_by_a_kernel() -> None:
 
 def test_effects_of_the_bare_plant_change_its_parameters_and_need_no_kernel() -> None:
     found = [effect for effect in fx.CATALOGUE if effect.of_bare_plant]
-    assert len(found) == 3
+    assert len(found) == 4
     for effect in found:
         values = PLANT.defaults() | {"k0": math.inf if effect.axis == "rigid" else 1500.0}
         sizes = dict.fromkeys(effect.names, 0.5)

@@ -197,6 +197,7 @@ def test_effects_of_transmission_and_link_are_not_looked_for_on_a_rigid_axis():
         "stribeck_friction_link", "load_friction", "backlash", "piecewise_stiffness", "hysteresis",
         "transmission_damping", "kinematic_error", "extra_mode",
         "coulomb_friction", "viscous_friction", "directional_loss", "asymmetric_stiffness",
+        "cubic_stiffness",
     }  # fmt: skip
     refit = fitter.refit()
     assert set(refit.model.plant) == {"jm", "fsm", "fvm"}
@@ -220,6 +221,20 @@ def test_friction_that_the_nominal_lacks_is_a_cause(axis, kind, motor, link):
     total = own[motor] + own[link]
     assert total == pytest.approx(case.rig[motor] + case.rig[link], rel=0.05)
     assert not set(own) & set(effects.EFFECTS[kind].names)
+
+
+def test_a_cubic_stiffness_that_the_nominal_lacks_is_a_cause():
+    """The rig's spring stiffens, its datasheet has it linear."""
+    case = simulate_case({}, seed=7, **SMALL)
+    nominal = {**NOMINAL, "k1": 0.0}
+    assert "cubic_stiffness" in catalogue(nominal) and "cubic_stiffness" not in catalogue(NOMINAL)
+    found, fitter = search(
+        case.recorded, nominal, "cubic_stiffness", "piecewise_stiffness", "torque_bias"
+    )
+    assert found.best.effects == ("cubic_stiffness",)
+    assert found.best.held_chi2 / fitter.held.size < 1.5
+    own = simulator_values({**found.best.model.plant, **found.best.model.effects})
+    assert own["k1"] == pytest.approx(case.rig["k1"], rel=0.05)
 
 
 def test_one_side_that_has_friction_is_not_offered_it_again():
