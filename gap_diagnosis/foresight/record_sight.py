@@ -43,7 +43,7 @@ class RecordSight:
         records = replace(records, records=tuple(chosen))
         counts = [realizations or len(runs) for runs in members.values()]
         self._stands_for = [max(count / RECORDS, 1.0) for count in counts]
-        self._evidence = Evidence(records, nominal.plant)
+        self._evidence = Evidence(records, nominal.whole_plant)
         self.noise_known = self._evidence.noise.known
         self.scales = Scales.of_record(
             [r.position for r in chosen],

@@ -33,7 +33,7 @@ _PURPOSES: tuple[Purpose, ...] = ("fit", "select", "report")
 _CYCLE: tuple[Purpose, ...] = ("fit", "select", "fit", "report")
 """Purposes of the blocks of a level's only record, shifted from level to level: what one time of
 the record shows serves all purposes."""
-_SIMULATION = 1e-3  # error of the simulation itself, relative to the rms of a cell
+_SIMULATION = 1e-3  # error of the simulation itself, of its torque or of its motion
 _DIVERGED = 1e6
 
 
@@ -90,6 +90,12 @@ class Evidence:
         self.lines = band_lines(power, self.noise.std_rad**2)
         self.edges = _edges(self.lines)
         self.simulator = RecordSimulator(records, self.noise, self.lines * self.line_hz, nominal)
+        frequency = (np.arange(self.lines) + 0.5) * self.line_hz
+        self._held = [
+            lapped(r.torque, self.hop)[:, : self.lines]
+            / np.maximum(np.abs(self.simulator.response(frequency, i)), 1e-300)
+            for i, r in enumerate(records.records)
+        ]
         self.parts = tuple(_parts(records, self.hop))
         self._band = np.searchsorted(self.edges, np.arange(self.lines), side="right") - 1
 
@@ -142,9 +148,11 @@ class Evidence:
 
     def measured(self, which: Sequence[int]) -> np.ndarray:
         """Return the lines of the measured position on parts, (errors,), rad."""
+        return self._on_parts(self._measured, which)
+
+    def _on_parts(self, lines: Sequence[np.ndarray], which: Sequence[int]) -> np.ndarray:
         pieces = [
-            self._measured[self.parts[i].record][self.parts[i].windows, : self.lines].ravel()
-            for i in which
+            lines[self.parts[i].record][self.parts[i].windows, : self.lines].ravel() for i in which
         ]
         return np.concatenate(pieces)
 
@@ -181,9 +189,18 @@ class Evidence:
         return self.parts[part].windows.stop - self.parts[part].windows.start
 
     def floor(self, which: Sequence[int]) -> np.ndarray:
-        """Return the least variance of a cell, (cells,): noise and the simulation's own error."""
+        """Return the least variance of a cell, (cells,): noise and the simulation's own error.
+
+        A loop that holds the position turns a share of its torque into a share of the motion that
+        this torque would make against the controller alone: much less than of the motion itself
+        where a stiff loop moves far and slowly.
+        """
         noise = self.noise.std_rad**2 if self.noise.known else 0.0
-        return noise + (_SIMULATION**2) * self.mean_squares(self.measured(which), which) + 1e-30
+        moved, held = (
+            self.mean_squares(self._on_parts(lines, which), which)
+            for lines in (self._measured, self._held)
+        )
+        return noise + _SIMULATION**2 * np.minimum(moved, held) + 1e-30
 
     def mean_squares(self, values: np.ndarray, which: Sequence[int]) -> np.ndarray:
         """Return the mean square of numbers on parts in each cell, (cells,); 0 where none is."""

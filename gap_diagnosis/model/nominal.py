@@ -59,11 +59,13 @@ def read_nominal(source: str | Path) -> dict[str, float]:
     """Return the nominal parameters of the bare plant (PLANT names, SI units).
 
     Args:
-        source: `paper`, or a ROS parameter file that names all of them under /rig/simulator.
+        source: `paper`, or a ROS parameter file that names them under /rig/simulator. Friction and
+            k1 that it leaves out are zero: the datasheet lacks them. Without j and k0, or with an
+            infinite k0, the axis is rigid, and jm is all its inertia but for j.
 
     Raises:
-        InputError: no such file, no simulator in it, an unknown or missing name, a value out of
-            range, or an effect that is switched on.
+        InputError: no such file, no simulator in it, an unknown name, an inertia or a stiffness
+            that is missing, a value out of range, or an effect that is switched on.
     """
     if str(source) == PAPER:
         return {name: float(value) for name, value in PLANT.defaults().items()}
@@ -74,14 +76,16 @@ def read_nominal(source: str | Path) -> dict[str, float]:
         )
     where = f"{source}: /rig/simulator"
     checked = SIMULATOR.check(given, where)
-    missing = [name for name in PLANT.names if name not in given]
-    if missing:
+    rigid = math.isinf(checked["k0"]) if "k0" in given else "j" not in given
+    needed = ("jm",) if rigid else ("jm", "j", "k0")
+    if missing := [name for name in needed if name not in given]:
         raise InputError(
-            f"{where}: {', '.join(missing)} missing; a nominal file names all of "
-            f"{', '.join(PLANT.names)}, or use --nominal paper for the paper's values."
+            f"{where}: {', '.join(missing)} missing; a flexible joint has jm, j and k0, a rigid "
+            f"axis jm alone, and --nominal {PAPER} takes the paper's values."
         )
     refuse_effects(checked, where)
-    return {name: float(checked[name]) for name in PLANT.names}
+    lacking = dict.fromkeys(PLANT.names, 0.0) | ({"k0": math.inf} if rigid else {})
+    return lacking | {name: float(checked[name]) for name in PLANT.names if name in given}
 
 
 def refuse_effects(values: Mapping[str, object], where: str) -> None:

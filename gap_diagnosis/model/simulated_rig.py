@@ -62,12 +62,15 @@ class Model:
         return replace(self, effects={**self.effects, **effects})
 
     @property
+    def whole_plant(self) -> dict[str, float]:
+        """All bare parameters by the names of PLANT, those of a rigid axis as well."""
+        none = dict.fromkeys(plant.PLANT.names, 0.0)
+        return {**none, "k0": math.inf, **self.plant}
+
+    @property
     def plant_coefficients(self) -> tuple[float, ...]:
         """Bare parameters as the compiled plant takes them."""
-        if self.rigid:
-            none = dict.fromkeys(plant.PLANT.names, 0.0)
-            return plant.coefficients({**none, "k0": math.inf, **self.plant, **self.effects})
-        return plant.coefficients({**self.plant, **self.effects})
+        return plant.coefficients({**self.whole_plant, **self.effects})
 
     @property
     def one_body(self) -> bool:

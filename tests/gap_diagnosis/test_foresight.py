@@ -56,6 +56,15 @@ def test_an_effect_is_named_above_its_limit_and_not_below(effect):
     assert named == [[effect], []]
 
 
+def test_records_of_a_rigid_axis_have_limits():
+    rigid = {"jm": 0.5, "fsm": 5.0, "fvm": 3.0, "j": 0.0, "fs": 0.0, "fv": 0.0, "k1": 0.0}
+    rigid["k0"] = math.inf
+    records = simulate_case({}, seed=3, plant={"k0": math.inf}, **SHORT).recorded.as_records()
+    seen = foresee(records, rigid, effects=["torque_bias"])
+    (one,) = seen.effects
+    assert 0.0 < one.limit < 5.0 and {p.name for p in seen.parameters} == {"jm", "fsm", "fvm"}
+
+
 def test_standard_errors_are_those_of_repeated_refits():
     noise = 1e-3  # so that the simulation's own budget of 0.1 % does not count
     case = simulate_case(seed=4, off=0.0, noise_rad=noise, **SHORT)

@@ -11,6 +11,7 @@ from fjr_interface.parameter_file import save_parameter_file
 from fjr_kit.errors import InputError
 from fjr_sim_node.plant import PLANT
 from gap_diagnosis.model.nominal import UNITS, read_nominal, refuse_wrong_units
+from gap_diagnosis.model.simulated_rig import Model
 
 PAPER = PLANT.defaults()
 
@@ -52,10 +53,24 @@ def test_bad_values_are_refused_with_file_and_name(tmp_path, change, words):
     assert str(caught.value).startswith(str(file)) and words in str(caught.value)
 
 
-def test_missing_names_are_all_named(tmp_path):
-    values = {name: value for name, value in PAPER.items() if name not in ("k1", "fvm")}
-    with pytest.raises(InputError, match=r"fvm, k1 missing.*--nominal paper"):
-        read_nominal(write(tmp_path, values))
+@pytest.mark.parametrize(
+    ("given", "missing"),
+    [({"jm": 0.2, "k0": 900.0}, "j"), ({"jm": 0.2, "j": 0.1}, "k0"), ({"fsm": 0.2}, "jm"),
+     ({"k0": 900.0}, "jm, j")],
+)  # fmt: skip
+def test_missing_inertias_and_stiffness_are_all_named(tmp_path, given, missing):
+    with pytest.raises(InputError, match=rf": {missing} missing;.*--nominal paper"):
+        read_nominal(write(tmp_path, given))
+
+
+def test_what_a_datasheet_does_not_give_is_zero_and_an_inertia_alone_is_a_rigid_axis(tmp_path):
+    nothing = {"fs": 0.0, "fsm": 0.0, "fv": 0.0, "fvm": 0.0, "k1": 0.0}
+    for given in ({"jm": 95.0}, {"jm": 95.0, "k0": math.inf}):
+        found = read_nominal(write(tmp_path, given))
+        assert found == {"jm": 95.0, "j": 0.0, "k0": math.inf, **nothing}
+        assert Model.nominal(found).rigid
+    flexible = {"jm": 0.2, "j": 0.1, "k0": 900.0, "fsm": 1.0}
+    assert read_nominal(write(tmp_path, flexible)) == {**nothing, **flexible}
 
 
 def test_a_file_of_other_nodes_is_no_nominal(tmp_path):
