@@ -13,6 +13,7 @@ from fjr_records.importers.record_file import SYMBOLS, Record
 from fjr_records.importers.repetition import Repetition
 
 _UNITS = {"reference": "rad", "torque": "N m", "position": "rad", "link": "rad"}
+_LINEAR_UNITS = {"reference": "m", "torque": "N", "position": "m", "link": "m"}
 
 
 def summary(understood: Understood, columns: Mapping[str, Column]) -> Iterator[str]:
@@ -30,12 +31,13 @@ def _file(
         f"{record.path.name}: level {one.level}, realization {one.realization}: {seconds:.6g} s at "
         f"{record.sample_rate_hz:.6g} Hz, {record.samples} samples"
     )
+    units = _LINEAR_UNITS if one.linear else _UNITS
     for quantity, symbol in SYMBOLS.items():
         if symbol not in record.signals:
             if quantity != "link":
                 yield f"  {quantity:<10} not recorded"
             continue
-        values, unit = record.signals[symbol], _UNITS[quantity]
+        values, unit = record.signals[symbol], units[quantity]
         column = columns[quantity]
         yield (
             f"  {quantity:<10} rms {np.sqrt(np.mean(values**2)):.4g} {unit}, from "

@@ -41,6 +41,11 @@ class _Description(BaseModel):
     repeat_of: int | None = Field(None, ge=0)
     controller: dict[str, Any] | None = None
 
+    @property
+    def linear(self) -> bool:
+        """Whether the axis is linear: m, N and kg stand where rad, N m and kg m2 are said."""
+        return (self.model_extra or {}).get("axis") == "linear"
+
     def to_json(self) -> str:
         """Return the JSON text, always the same for the same description."""
         return self.model_dump_json(by_alias=True)

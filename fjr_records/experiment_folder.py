@@ -73,7 +73,7 @@ def open_experiment(
     else:
         grid, bags, notes = described(readers, experiments, override)
     _refuse_lines_beyond_band(readers, grid)
-    missing = (note for reader in readers for note in reader.notes)
+    missing = dict.fromkeys(note for reader in readers for note in reader.notes)
     return ExperimentFolder(
         str(folder),
         grid,

@@ -136,7 +136,7 @@ def read_records(
             )
     records = [_read(reader, place) for place, reader in enumerate(readers)]
     records.sort(key=lambda r: (r.level, r.description.realization))
-    notes = [note for reader in readers for note in reader.notes]
+    notes = list(dict.fromkeys(note for reader in readers for note in reader.notes))
     undescribed = [r.path.name for r in readers if r.experiment is None]
     if undescribed:
         notes.append(

@@ -34,6 +34,10 @@ __all__ = [
     "read_record",
 ]
 
+LINEAR_AXIS = (
+    "The axis is linear: read m for rad, N for N m and kg for kg m2 wherever units are said."
+)
+
 MAX_LAG = 2**21
 _AUDIT_BLOCK = 2**16
 _RATE_SAMPLES = 1000
@@ -68,7 +72,7 @@ class BagReader:
         experiment: the description in metadata.yaml or on the experiment topic; None if neither.
         sample_rate_hz: from the description, else from the stamps.
         topics: the topic of each signal that is read, by its name in `Record`.
-        notes: sentences on what is missing of the bag but can be done without.
+        notes: sentences on what is missing of the bag but can be done without, and on its units.
     """
 
     def __init__(self, path: Path | str, signal_map: SignalMap = DEFAULT) -> None:
@@ -87,6 +91,8 @@ class BagReader:
         strings = [topic for topic, kind in topics.items() if kind == STRING]
         self._experiment_topic = described.find(strings, self._bag)
         self.experiment = self._find_description()
+        if self.experiment is not None and self.experiment.linear:
+            self.notes += (LINEAR_AXIS,)
         if isinstance(self.experiment, RecordDescription) and "reference" in self._sources:
             self._sources["reference"] = replace(self._sources["reference"], required=False)
         found = {name: s.find(topics, self._bag) for name, s in self._sources.items()}

@@ -11,7 +11,7 @@ from fjr_interface.experiment import Experiment, RecordDescription
 from fjr_kit.errors import InputError
 
 from ..lines import classify
-from .import_map import Column
+from .import_map import Column, is_linear
 from .record_file import Record
 from .repetition import Repetition
 
@@ -57,6 +57,7 @@ def describe(
     found: list[Description] = []
     periodic = all(isinstance(record.repetition, Repetition) for record in records)
     lines = _common_lines(records, notes) if periodic else None
+    axis = {"axis": "linear"} if is_linear(columns) else {}
     for level in range(levels):
         part = slice(level * each_level, (level + 1) * each_level)
         inside = records[part]
@@ -72,6 +73,7 @@ def describe(
                 "repeat_of": repeats[number],
                 "controller": controllers[part][number],
                 "imported": _source(record, columns),
+                **axis,
             }
             source = str(record.path)
             if lines is None:

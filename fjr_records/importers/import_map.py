@@ -10,15 +10,20 @@ from fjr_kit.errors import InputError
 
 _ANGLE = {"rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "deg": math.pi / 180.0, "rev": 2.0 * math.pi}
 _TORQUE = {"N m": 1.0, "Nm": 1.0, "mN m": 1e-3, "mNm": 1e-3, "kN m": 1e3, "kNm": 1e3}
+_LENGTH = {"m": 1.0, "mm": 1e-3, "um": 1e-6}
+_FORCE = {"N": 1.0, "kN": 1e3}
 _TIME = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 UNITS: Mapping[str, Mapping[str, float]] = {
-    "reference": _ANGLE,
-    "torque": _TORQUE,
-    "position": _ANGLE,
-    "link": _ANGLE,
+    "reference": _ANGLE | _LENGTH,
+    "torque": _TORQUE | _FORCE,
+    "position": _ANGLE | _LENGTH,
+    "link": _ANGLE | _LENGTH,
     "time": _TIME,
 }
-"""Units of each quantity with their factors to rad, N m and s; the first is the default."""
+"""Units of each quantity with their factors to rad, N m and s, or to m and N of a linear axis; the
+first is the default."""
+LINEAR = frozenset({*_LENGTH, *_FORCE})
+"""Units of a linear axis."""
 GREATEST_FACTOR = 1e12
 """A factor to SI lies between this and its inverse."""
 REQUIRED = ("torque", "position")
@@ -33,11 +38,13 @@ class Column:
         factor: to SI, with the sign.
         by_factor: whether the factor was given as a number, so that the column may be anything: a
             current that stands for the torque, a voltage that stands for the reference.
+        unit: in which it was given to be; empty if none was.
     """
 
     name: str
     factor: float = 1.0
     by_factor: bool = False
+    unit: str = ""
 
     @classmethod
     def parse(cls, quantity: str, text: str) -> Column:
@@ -56,7 +63,8 @@ class Column:
                 f"{quantity}={text} is not understood; write {quantity}=[-]column[:unit] with one "
                 f"of the units {', '.join(units)}, or with a factor to {next(iter(units))}."
             )
-        return cls(name.strip(), sign * factor, unit not in units and bool(unit))
+        known = unit in units
+        return cls(name.strip(), sign * factor, bool(unit) and not known, unit if known else "")
 
 
 def parse_map(specs: Sequence[str]) -> dict[str, Column]:
@@ -77,7 +85,25 @@ def parse_map(specs: Sequence[str]) -> dict[str, Column]:
     missing = [quantity for quantity in REQUIRED if quantity not in columns]
     if missing:
         raise InputError(f"the map lacks {' and '.join(missing)}; add {missing[0]}=column.")
+    _refuse_both_axes(columns)
     return columns
+
+
+def is_linear(columns: Mapping[str, Column]) -> bool:
+    """Tell whether the units of a map are those of a linear axis."""
+    return any(column.unit in LINEAR for column in columns.values())
+
+
+def _refuse_both_axes(columns: Mapping[str, Column]) -> None:
+    """Raise InputError if some units are those of a linear axis and others of a rotary one."""
+    given = {q: c.unit for q, c in columns.items() if c.unit and q != "time"}
+    linear = [f"{quantity} in {unit}" for quantity, unit in given.items() if unit in LINEAR]
+    rotary = [f"{quantity} in {unit}" for quantity, unit in given.items() if unit not in LINEAR]
+    if linear and rotary:
+        raise InputError(
+            f"the map has {linear[0]}, as of a linear axis, and {rotary[0]}, as of a rotary one; "
+            "give m and N, or rad and N m."
+        )
 
 
 def parse_harmonics(text: str) -> list[int]:

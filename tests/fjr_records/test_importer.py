@@ -10,11 +10,13 @@ import pytest
 from scipy.io import savemat
 
 from bla_analyzer.analysis import analyze
-from fjr_interface.bags.reader import BagReader, SignalMap, audit, find_bags
+from fjr_interface.bags.reader import LINEAR_AXIS, BagReader, SignalMap, audit, find_bags
 from fjr_kit.errors import InputError
 from fjr_records.importers.import_map import Column, parse_harmonics, parse_map
 from fjr_records.importers.importer import import_files
 from fjr_records.importers.record_file import ImportOptions
+from fjr_records.periodic import read_experiment
+from fjr_records.records import read_records
 
 RATE_HZ = 500.0
 N = 200
@@ -115,13 +117,15 @@ def test_units_signs_and_time_column(tmp_path):
         ("c:N m", 1.0),
         ("c:mNm", 1e-3),
         ("-c:kN m", -1e3),
+        ("c:kN", 1e3),
         ("c:0.098", 0.098),
         ("c:-2", -2),
     ],
 )
 def test_torque_units(text, factor):
     by_factor = text[-1].isdigit()
-    assert Column.parse("torque", text) == Column("c", factor, by_factor)
+    unit = "" if by_factor else text.partition(":")[2]
+    assert Column.parse("torque", text) == Column("c", factor, by_factor, unit)
 
 
 def test_degrees_taken_for_rad_are_refused_unless_a_factor_says_that_they_are_meant(tmp_path, run):
@@ -142,6 +146,25 @@ def test_degrees_taken_for_rad_are_refused_unless_a_factor_says_that_they_are_me
     assert "y seems to be in degrees and taken for rad" in " ".join(analysed.stdout.split())
     right = ("--out", tmp_path / "b", *words, "--map=position=y:deg")
     assert run("import", tmp_path / "rig.npz", *right).stderr == ""
+
+
+def test_a_linear_axis_is_told_by_its_units_and_every_result_says_so(tmp_path, run):
+    values = record()
+    values["y"], values["r"] = 1e3 * values["y"], 1e3 * values["r"]
+    np.savez(tmp_path / "run.npz", **values)
+    units = "reference=r:mm,torque=u:N,position=y:mm"
+    out = tmp_path / "rig"
+    done = run(
+        "import", tmp_path / "run.npz", "--map", units, "--sample-rate-hz", RATE_HZ, "--out", out
+    )  # fmt: skip
+    assert done.exit_code == 0, done.stderr
+    assert " m (y, times 0.001)" in done.stdout and " N (u, times 1)" in done.stdout
+    assert " rad" not in done.stdout and "N m" not in done.stdout
+    folder = read_experiment(out)
+    assert folder.experiment.linear and LINEAR_AXIS in folder.notes
+    assert LINEAR_AXIS in read_records(out).notes
+    done = run("analyze", out, "--method", "fast", "--out", tmp_path / "analysis")
+    assert LINEAR_AXIS in " ".join((done.stdout + done.stderr).split())
 
 
 def test_levels_and_realizations(tmp_path):
@@ -233,6 +256,7 @@ def test_harmonics_text():
             "one of the units rad, mrad, .*, or with a f",
         ),
         (("reference=r", "torque=u:rad", "position=y"), "one of the units N m, "),
+        (("torque=u:N m", "position=y:mm"), "position in mm, as of a linear axis, and torque in N"),
         (("reference=r", "torque=u:0", "position=y"), "torque=u:0 is not understood"),
         (("reference=r", "torque=u:nan", "position=y"), "torque=u:nan is not understood"),
         (("reference=r", "torque=u:1e300", "position=y"), "torque=u:1e300 is not understood"),
