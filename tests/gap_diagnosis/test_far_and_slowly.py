@@ -1,0 +1,81 @@
+"""A stiff loop that moves far and slowly: what its torque shows, the motion hardly does."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+
+import numpy as np
+import pytest
+
+from controller_node import pd_filtered
+from fjr_interface.experiment import RecordDescription
+from fjr_records.records import Record, RecordSet
+from fjr_sim_node.plant import coefficients
+from fjr_sim_node.simulation.closed_loop import simulate
+from gap_diagnosis.model.evidence import Evidence
+from gap_diagnosis.record_investigation import investigate_records
+
+RATE, NOISE = 500.0, 2e-6
+MASS, COULOMB, VISCOUS = 95.0, 20.0, 200.0
+CARRIAGE = {
+    "jm": MASS, "j": 0.0, "fs": 0.0, "fsm": COULOMB, "fv": 0.0, "fvm": VISCOUS, "k0": math.inf,
+    "k1": 0.0,
+}  # fmt: skip
+BARE = {**CARRIAGE, "fsm": 0.0, "fvm": 0.0}
+LOOKED_FOR = (
+    "coulomb_friction", "viscous_friction", "quadratic_friction", "delay", "torque_bias",
+)  # fmt: skip
+CROSSOVER = 2.0 * math.pi * 12.0
+LAW = pd_filtered.CONTROLLER.check(
+    {"sample_rate_hz": RATE, "p": 0.5 * MASS * CROSSOVER**2, "d": MASS * CROSSOVER, "n": 200.0}
+)
+
+
+def moves() -> np.ndarray:
+    """Return smooth moves of up to a quarter of a metre with rests between them, 16 s."""
+    ends = [(0.5, 0.24, 2.0), (3.5, 0.05, 1.4), (6.0, 0.2, 1.0), (8.0, 0.0, 1.6),
+            (10.5, 0.24, 1.2), (12.5, 0.1, 0.8), (14.0, 0.22, 0.9)]  # fmt: skip
+    time, at = np.arange(int(16.0 * RATE)) / RATE, 0.0
+    reference = np.zeros(time.size)
+    for begin, end, seconds in ends:
+        x = np.clip((time - begin) / seconds, 0.0, 1.0)
+        reference += (end - at) * x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
+        at = end
+    return reference
+
+
+@cache
+def carriage() -> RecordSet:
+    """Return two runs of a carriage whose controller nobody knows."""
+    rng, made = np.random.default_rng(3), []
+    for run in range(2):
+        signals = simulate(
+            moves(),
+            RATE,
+            coefficients(CARRIAGE),
+            pd_filtered.coefficients(LAW),
+            NOISE * rng.standard_normal(int(16.0 * RATE)),
+        )
+        description = RecordDescription.of(
+            "test", sample_rate_hz=RATE, realization=run, realizations=2, axis="linear"
+        )
+        made.append(Record(f"run_{run}", description, None, signals.torque, signals.position, None))
+    return RecordSet("test", RATE, tuple(made))
+
+
+def test_the_simulation_errs_by_a_share_of_the_torque_not_of_a_motion_that_is_held():
+    evidence = Evidence(carriage(), BARE)
+    parts = evidence.parts_for("fit")
+    floor = np.sqrt(evidence.floor(parts))
+    motion = np.sqrt(evidence.mean_squares(evidence.measured(parts), parts))
+    assert floor[0] < 1e-4 * motion[0]  # slow: held
+    assert np.all(floor <= 1.01 * np.hypot(1e-3 * motion, evidence.noise.std_rad))
+
+
+def test_friction_of_a_carriage_is_named_though_its_loop_is_not_known():
+    diagnosis = investigate_records(carriage(), BARE, effects=LOOKED_FOR).diagnosis
+    assert {cause.effect for cause in diagnosis.causes} == {"coulomb_friction", "viscous_friction"}
+    found = diagnosis.parameters
+    assert found["coulomb_friction.motor_nm"].value == pytest.approx(COULOMB, rel=0.1)
+    assert found["viscous_friction.motor_nm_s_rad"].value == pytest.approx(VISCOUS, rel=0.1)
