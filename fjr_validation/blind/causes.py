@@ -239,14 +239,17 @@ _FLEXIBLE: tuple[Drawer, ...] = (
     _transmission_damping,
     _ripple("kinematic_error", "kinematic", "rad", 0.02, 0.4, lambda at: at.deflection),
     _extra_mode,
+    _lacking(
+        "cubic_stiffness", "k1", lambda at: at.torque / at.deflection**3, 0.3, "stiffness_nm_rad3"
+    ),
 )
 
 
 def drawers(*, rigid: bool, stationary: bool) -> tuple[Drawer, ...]:
     """Return the drawers of causes that a rig can have.
 
-    A gain of the torque is never one: it is exactly a scale of all parameters. Nor is a stiffness
-    that the datasheet lacks. A drift is one only where friction does not scatter anyway.
+    A gain of the torque is never one: it is exactly a scale of all parameters. Nor is the linear
+    stiffness that a datasheet lacks. A drift is one only where friction does not scatter anyway.
     """
     flexible = () if rigid else _FLEXIBLE
     return (*_FRICTION, *_ANY_AXIS, *flexible, *(() if stationary else (_drift,)))
@@ -256,7 +259,7 @@ FAMILIES: tuple[frozenset[str], ...] = tuple(
     frozenset(names)
     for names in (
         ("asymmetric_friction", "torque_bias", "gravity"),
-        ("backlash", "piecewise_stiffness", "asymmetric_stiffness"),
+        ("backlash", "piecewise_stiffness", "asymmetric_stiffness", "cubic_stiffness"),
         ("delay", "actuator_lag", "torque_slew_limit"),
         ("position_friction", "cogging", "torque_constant_ripple", "kinematic_error"),
         ("hysteresis", "transmission_damping", "directional_loss", "load_friction"),

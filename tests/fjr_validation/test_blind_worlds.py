@@ -112,7 +112,7 @@ def test_every_setting_is_drawn_by_some_effect():
         rng = np.random.default_rng(seed)
         for draw in (*drawers(rigid=False, stationary=False), *laws(rigid=False)):
             drawn |= set(draw(rng, SCALES).settings(0.1))
-    assert drawn - {"fs", "fsm", "fvm"} == set(SETTINGS)
+    assert drawn - {"fs", "fsm", "fvm", "k1"} == set(SETTINGS)
 
 
 def test_two_causes_are_never_near_each_other():

@@ -69,10 +69,10 @@ def test_all_effects_are_screened_anew_once_a_cause_has_closed_most_of_the_error
     assert set(search._screened(fit, others)) == set(looked) == set(others)
 
 
-@pytest.mark.parametrize("scatter", [0.0, 0.05])
+@pytest.mark.parametrize("scatter", [0.0, 0.15])
 def test_friction_that_scatters_may_differ_between_levels_of_one_run(scatter):
-    """Friction of the one run of a level is a third off: too much, unless it scatters."""
-    made = records(runs=1, seconds=6.0)
+    """Friction of a level's one run is two fifths off: too much, unless it scatters."""
+    made = records(runs=1, seconds=10.0)
     fitter = CellFitter(Evidence(made, BARE), BARE, 0.1)
     fit = fitter.refit()
     for effect in ("coulomb_friction", "viscous_friction"):
@@ -84,7 +84,7 @@ def test_friction_that_scatters_may_differ_between_levels_of_one_run(scatter):
         if name.startswith("coulomb_friction.")
     ]
     own = fit.solution.jacobian[:, columns] @ fit.solution.x[columns]
-    moved = fit.solution.residuals - 0.3 * own * (level == 1)
+    moved = fit.solution.residuals - 0.4 * own * (level == 1)
     fit = replace(fit, solution=replace(fit.solution, residuals=moved))
     friction = dict.fromkeys(("fs", "fsm", "fv", "fvm"), scatter)
     p = invariance(fitter, fit, "coulomb_friction", friction)
