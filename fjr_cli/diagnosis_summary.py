@@ -25,6 +25,7 @@ from gap_diagnosis.outcome.verdict_words import (
     closed,
     explanation,
     headline,
+    is_better,
     meaning,
     summaries,
     unit_of,
@@ -60,7 +61,7 @@ def print_summary(diagnosis: Diagnosis, console: Console, out: Path) -> None:
     for note in diagnosis.notes:
         _say(console, f"Note: {note}")
     _say(console, f"When not to believe it: {WORDS[diagnosis.verdict].doubt}")
-    if diagnosis.parameters:
+    if diagnosis.parameters and is_better(diagnosis):
         _say(console, f"Better simulation: fjr simulate --rig {shlex.quote(str(out))}/updated.yaml")
 
 

@@ -21,6 +21,10 @@ _NO_EXPERIMENT = (
     "No experiment was found that would tell them apart within the recorded torques; updated.yaml "
     "holds the first."
 )
+_WORSE = (
+    "Use the nominal parameters as they are: those of updated.yaml, which were fitted, come no "
+    "nearer to the rig{on}. Longer or stronger records may mend the fit."
+)
 
 
 @dataclass(frozen=True)
@@ -85,7 +89,7 @@ WORDS: dict[Verdict, Words] = {
     "unexplained": Words(
         "Unexplained",
         "A gap remains after the refit, and no explanation of the catalogue closes it.",
-        "Look at where it lies below; updated.yaml holds the refit, which is the best there is. "
+        "Look at where it lies below; updated.yaml holds the refit. "
         "Check mounting, encoder and logging before looking for a law of friction.",
         "More than two effects at once, or fits that did not converge (see the ranking), can end "
         "here too.",
@@ -128,9 +132,27 @@ def meaning(diagnosis: Diagnosis) -> str:
 
 def action(diagnosis: Diagnosis) -> str:
     """Return what to do next."""
+    if diagnosis.verdict != "no_gap" and not is_better(diagnosis):
+        return _WORSE.format(on=ON[diagnosis.reported_on])
     if diagnosis.verdict == "ambiguous" and diagnosis.next_experiment is None:
         return _NO_EXPERIMENT
     return WORDS[diagnosis.verdict].action
+
+
+def is_better(diagnosis: Diagnosis) -> bool:
+    """Tell whether updated.yaml comes nearer to the rig than the nominal parameters.
+
+    It does not if both its error of the position and its misfit are as large or larger.
+    """
+    before, after = diagnosis.gap.nominal, diagnosis.gap.explained or diagnosis.gap.refit
+    if before is None or after is None:
+        return before is None
+    pairs = [
+        (before.nrmse_position, after.nrmse_position),
+        (before.chi2_per_dof, after.chi2_per_dof),
+    ]
+    known = [(old, new) for old, new in pairs if old is not None and new is not None]
+    return not known or any(new < old for old, new in known)
 
 
 def closed(diagnosis: Diagnosis) -> str:

@@ -15,7 +15,7 @@ from gap_diagnosis.outcome.diagnosis import (
     Gaps,
     NextExperiment,
 )
-from gap_diagnosis.outcome.verdict_words import ON, OUT_OF_TIME, action, meaning
+from gap_diagnosis.outcome.verdict_words import ON, OUT_OF_TIME, action, is_better, meaning
 from gap_diagnosis.which.confidence import (
     COEFFICIENTS,
     NAMES,
@@ -106,3 +106,20 @@ def test_nobody_is_sent_to_an_experiment_that_is_not_named():
     named = ambiguous.model_copy(update={"next_experiment": planned})
     assert ambiguous.next_experiment is None and "Run the next experiment" in action(named)
     assert "No experiment was found" in action(ambiguous) and "Run the" not in action(ambiguous)
+
+
+@pytest.mark.parametrize("verdict", ["unexplained", "parameters_only"])
+def test_updated_parameters_are_advised_only_where_they_come_nearer(verdict):
+    after = said(verdict, left=30.0, refit=30.0)
+    worse = Gap(nrmse_position=0.2, nrmse_torque=0.1, chi2_per_dof=300.0)
+    mixed = Gap(nrmse_position=0.2, nrmse_torque=0.1, chi2_per_dof=30.0)
+    for end, better in ((worse, False), (mixed, True), (gap(200.0), False), (None, False)):
+        gaps = after.gap.model_copy(update={"refit": end, "explained": end})
+        diagnosis = after.model_copy(update={"gap": gaps})
+        assert is_better(diagnosis) == better
+        assert ("Use the nominal parameters" in action(diagnosis)) != better
+
+
+def test_a_nominal_that_diverges_is_worse_than_any_fit():
+    gaps = said("unexplained").gap.model_copy(update={"nominal": None})
+    assert is_better(said("unexplained").model_copy(update={"gap": gaps}))
