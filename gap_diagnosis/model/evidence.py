@@ -29,6 +29,7 @@ WINDOWS = 24
 record, since that serves all purposes, and a test of few blocks shows nothing."""
 _LONGEST_WINDOW_S = 4.0
 _WINDOWS_PER_BLOCK = 2
+_LONG = 160  # samples: longer hops are multiples of 16, which transforms fast
 _PURPOSES: tuple[Purpose, ...] = ("fit", "select", "report")
 _CYCLE: tuple[Purpose, ...] = ("fit", "select", "fit", "report")
 """Purposes of the blocks of a level's only record, shifted from level to level: what one time of
@@ -83,7 +84,7 @@ class Evidence:
         alone = any(levels.count(level) == 1 for level in levels)
         windows = 2 * WINDOWS if alone else WINDOWS
         hop = min(shortest / (windows + 1), 0.5 * _LONGEST_WINDOW_S * rate)
-        self.hop = max(2 * int(hop / 2), 8)
+        self.hop = max(int(hop - hop % (16 if hop >= _LONG else 2)), 8)
         self._measured = [lapped(r.position, self.hop) for r in records.records]
         self.noise: RecordNoise = record_noise(records)
         power = np.mean(np.concatenate(self._measured) ** 2, axis=0)
@@ -156,9 +157,18 @@ class Evidence:
         ]
         return np.concatenate(pieces)
 
-    def changes(self, positions: dict[int, np.ndarray], which: Sequence[int]) -> np.ndarray:
-        """Return the lines of changes of y on parts, (errors,), by the index of the record."""
-        lines = {i: lapped(change, self.hop)[:, : self.lines] for i, change in positions.items()}
+    def changes(
+        self, positions: dict[int, np.ndarray], which: Sequence[int], every: int = 1
+    ) -> np.ndarray:
+        """Return the lines of changes of y on parts, (errors,).
+
+        Args:
+            positions: by the index of the record, the changes, means of each `every` samples.
+            which: indices of parts.
+            every: a divisor of half the hop.
+        """
+        hop, scale = self.hop // every, np.sqrt(every)  # the transform is orthonormal
+        lines = {i: scale * lapped(p, hop)[:, : self.lines] for i, p in positions.items()}
         pieces = [lines[self.parts[i].record][self.parts[i].windows].ravel() for i in which]
         return np.concatenate(pieces)
 

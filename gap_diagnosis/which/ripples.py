@@ -132,22 +132,27 @@ def _motion(
     r = [recorded.realizations[i].played[-1] for i in misfit.which]
     loop = line_spectrum(y, lines.size) / (line_spectrum(np.array(r), lines.size) + 1e-300)
     response = np.array([_between(lines, excited, row[excited]) for row in loop]) / forward
-    p, s = model.plant, 2j * np.pi * lines * description.base_frequency_hz
-    twist = q - y
+    p, twist = model.plant, q - y
     return _Motion(
         motor=y,
         velocity=np.gradient(y, axis=1) * description.sample_rate_hz,
         torque=u,
         transmitted=p.get("k0", 0.0) * twist,
         response=response,
-        both=response * _of_pair(p, s),
+        both=response * of_pair(p, lines * description.base_frequency_hz),
     )
 
 
-def _of_pair(p: Mapping[str, float], s: np.ndarray) -> np.ndarray:
-    """Return the motor torque that acts as 1 N m on the motor against the link does."""
+def of_pair(p: Mapping[str, float], frequency_hz: np.ndarray) -> np.ndarray:
+    """Return the motor torque that acts as 1 N m on the motor against the link does, complex.
+
+    Args:
+        p: the plant's parameters by name; without k0 the transmission is rigid.
+        frequency_hz: float64 (n,).
+    """
     if "k0" not in p:
-        return np.ones(s.size)
+        return np.ones(frequency_hz.size)
+    s = 2j * np.pi * frequency_hz
     free = p["j"] * s**2 + p["fv"] * s
     return free / (free + p["k0"])
 

@@ -2,7 +2,8 @@
 
 A ripple acts as a torque along the model's own motion. What it does to the position is predicted
 linearly, by the response of plant and controller (or observer), G/(1 + G C_y); so hundreds of
-numbers of ripples can be tried at once, and only the best are simulated.
+numbers of ripples can be tried at once, and only the best are simulated. The torque is made at each
+sample and then averaged over as many as the lines of the evidence allow.
 """
 
 from __future__ import annotations
@@ -18,9 +19,11 @@ from fjr_sim_node.theory.linear import g0
 from ..model.evidence import Evidence
 from ..model.simulated_rig import Model
 from .least_squares import Solution
+from .ripples import of_pair
 
 MOST_TRIED = 240
 _FREE_HZ = 1e-3  # below, a free body has no response
+_LEAST_RATE = 8  # samples in a period of the highest line: averaging takes off 3 % there
 
 
 class RecordRipples:
@@ -45,10 +48,10 @@ class RecordRipples:
         """
         self._evidence, self._parts, self._weight = evidence, tuple(parts), weight
         self._runs = sorted({evidence.parts[i].record for i in parts})
-        moved = evidence.simulator.run([model], self._runs)[0]
-        self._motion = [run[[0, 2]] for run in moved]
-        self._responses = [self._response(model, i, run.shape[1]) for i, run in
-                           zip(self._runs, moved, strict=True)]  # fmt: skip
+        self._motion = evidence.simulator.run([model], self._runs)[0]
+        self._every = _averaged(evidence.hop, evidence.lines)
+        self._responses = [self._response(model, index, run.shape[1] // self._every) for index, run
+                           in zip(self._runs, self._motion, strict=True)]  # fmt: skip
         self._basis = np.linalg.qr(parent.jacobian)[0]
         self._left = self._beyond(parent.residuals)
         self._stiffness = model.plant.get("k0", 0.0)
@@ -70,45 +73,71 @@ class RecordRipples:
 
     def _gain(self, effect: str, cycles: float) -> float:
         """Return the fall of the cost by sine and cosine of a ripple of the best size."""
-        columns = []
-        for quarter in (0.0, 0.5 * np.pi):
-            changes = {
-                index: self._moved(k, self._torque(effect, k, cycles, quarter))
-                for k, index in enumerate(self._runs)
-            }
-            column = self._evidence.changes(changes, self._parts) * self._weight
-            columns.append(self._beyond(column))
-        own = np.array(columns)
-        sizes = np.linalg.lstsq(own.T, -self._left, rcond=1e-6)[0]
-        return -float(sizes @ (own @ self._left))
+        moved = [self._moved(k, self._torques(effect, k, cycles)) for k in range(len(self._runs))]
+        own = []
+        for quarter in (0, 1):
+            changes = {i: pair[quarter] for i, pair in zip(self._runs, moved, strict=True)}
+            column = self._evidence.changes(changes, self._parts, self._every)
+            own.append(self._beyond(column * self._weight))
+        columns = np.array(own)
+        sizes = np.linalg.lstsq(columns.T, -self._left, rcond=1e-6)[0]
+        return -float(sizes @ (columns @ self._left))
 
-    def _torque(self, effect: str, k: int, cycles: float, quarter: float) -> np.ndarray:
-        """Return the torque on the motor that a ripple of size 1 makes along the motion, (N,)."""
-        motor, _ = self._motion[k]
-        wave = np.sin(cycles * motor + quarter)
+    def _torques(self, effect: str, k: int, cycles: float) -> np.ndarray:
+        """Return the torques by ripples of size 1 along the motion.
+
+        Returns:
+            (2, N) on the motor; (4, N) where the link feels torques too: the last two act between
+            link and motor.
+        """
+        motor, torque, link = self._motion[k][:3]
+        waves = np.array([np.sin(cycles * motor), np.cos(cycles * motor)])
         acts_on = fx.EFFECTS[effect].acts_on
         if acts_on == "motor":
-            return -wave * np.sign(np.gradient(motor))
+            return -waves * np.sign(np.gradient(motor))
         if acts_on == "transmission":
-            return -self._stiffness * wave
-        return wave
+            slopes = cycles * np.array([waves[1], -waves[0]])
+            return self._stiffness * np.concatenate([-slopes * (link - motor), waves])
+        if not fx.EFFECTS[effect].full_parameters[0].unit:  # a share of the torque, not a torque
+            return waves * torque
+        return waves
 
-    def _moved(self, k: int, torque: np.ndarray) -> np.ndarray:
-        response = self._responses[k]
-        size = 2 * (response.size - 1)
-        return irfft(rfft(torque, size) * response, size)[: torque.size]
+    def _moved(self, k: int, torques: np.ndarray) -> np.ndarray:
+        """Return the changes of the position by `_torques`, averaged, (2, N // every)."""
+        count, samples = len(torques), torques.shape[1] // self._every
+        blocks = torques[:, : samples * self._every].reshape(count, samples, self._every)
+        averaged = blocks @ np.full(self._every, 1.0 / self._every)
+        response, size = self._responses[k], 2 * (self._responses[k].shape[1] - 1)
+        spectra = rfft(averaged, size).reshape(-1, 2, response.shape[1])
+        moved = np.einsum("fnl,fl->nl", spectra, response[: len(spectra)])
+        return irfft(moved, size)[:, :samples]
 
     def _response(self, model: Model, index: int, samples: int) -> np.ndarray:
-        """Return position per torque on the motor at the lines of a padded record, complex."""
-        size = next_fast_len(2 * samples, real=True)
-        size += size % 2
+        """Return position per torque on the motor, and per torque between link and motor.
+
+        Returns:
+            complex (2, lines), at the lines of a padded record.
+        """
+        size = 2 * next_fast_len(samples, real=True)
         rate = self._evidence.records.sample_rate_hz
-        frequency = np.maximum(rfftfreq(size, 1.0 / rate), _FREE_HZ)
+        frequency = np.maximum(rfftfreq(size, self._every / rate), _FREE_HZ)
         plant = {"j": 0.0, "fs": 0.0, "fv": 0.0, "k0": np.inf, **model.plant}
         plant_response = g0(plant, frequency, rate)
         holds = np.nan_to_num(self._evidence.simulator.response(frequency, index))
-        return plant_response / (1.0 + plant_response * holds)
+        response = plant_response / (1.0 + plant_response * holds)
+        return response * np.array([np.ones(frequency.size), of_pair(model.plant, frequency)])
 
     def _beyond(self, errors: np.ndarray) -> np.ndarray:
         """Return what the parent's parameters can't follow of errors, (errors,)."""
         return errors - self._basis @ (self._basis.T @ errors)
+
+
+def _averaged(hop: int, lines: int) -> int:
+    """Return over how many samples a signal may be averaged whose lines above `lines` don't count.
+
+    Args:
+        hop: of the lapped transform, samples; still an even number of averages.
+        lines: that count.
+    """
+    most = max(2 * hop // (_LEAST_RATE * lines), 1)
+    return next(every for every in range(most, 0, -1) if hop % (2 * every) == 0)

@@ -1,0 +1,60 @@
+"""Ripples of records: what they do is predicted by averages, and the right number is proposed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from test_evidence import NOMINAL, RATE, records
+
+from gap_diagnosis.model.evidence import Evidence
+from gap_diagnosis.which.cell_fits import CellFitter
+from gap_diagnosis.which.ripples_of_records import _averaged
+
+CASES = {
+    "position_friction": ({"amplitude_nm": 1.5, "cycles_per_turn": 30.0, "phase_rad": 0.7}, 2.0),
+    "kinematic_error": ({"amplitude_rad": 1e-3, "cycles_per_turn": 33.0, "phase_rad": 0.7}, 4.0),
+    "cogging": ({"amplitude_nm": 1.5, "cycles_per_turn": 57.0, "phase_rad": 0.7}, 1.5),
+    "torque_constant_ripple": (
+        {"amplitude": 0.08, "cycles_per_turn": 31.0, "phase_rad": 0.7}, 1.5,
+    ),
+}  # fmt: skip
+"""Truth, and how near a proposed number of cycles comes to it."""
+
+
+@pytest.mark.parametrize("effect", CASES)
+def test_ripples_are_proposed_near_enough_for_the_fit_to_find_them(effect):
+    truth, off = CASES[effect]
+    named = {f"{effect}.{name}": value for name, value in truth.items()}
+    fitter = CellFitter(Evidence(records(named, runs=2), NOMINAL), NOMINAL, 0.1)
+    refit = fitter.refit()
+    proposed = fitter._ripples(refit).cycles(effect, fitter.scales.cycles(), 4)
+    assert min(abs(np.array(proposed) - truth["cycles_per_turn"])) <= off
+    fit = fitter.add(refit, effect, fitter.screening(refit, effect).proposals())
+    found = fit.model.effects[f"{effect}.cycles_per_turn"]
+    assert found == pytest.approx(truth["cycles_per_turn"], rel=0.01)
+
+
+@pytest.mark.parametrize("every", [2, 4])
+def test_averaged_changes_have_the_lines_of_the_changes(every):
+    evidence = Evidence(records(seconds=32.0), NOMINAL)
+    evidence.lines = evidence.hop // (4 * every)
+    assert _averaged(evidence.hop, evidence.lines) == every
+    highest = RATE / (8 * every)
+    samples = evidence.records.records[0].samples
+    rng = np.random.default_rng(every)
+    spectrum = np.fft.rfft(rng.standard_normal(samples))
+    spectrum[np.fft.rfftfreq(samples, 1.0 / RATE) > highest] = 0.0
+    change = np.fft.irfft(spectrum, samples)
+    parts = [i for i, part in enumerate(evidence.parts) if part.record == 0]
+    full = evidence.changes({0: change}, parts)
+    blocks = change[: samples // every * every].reshape(-1, every).mean(axis=1)
+    averaged = evidence.changes({0: blocks}, parts, every)
+    assert np.abs(averaged - full).max() < 0.04 * np.abs(full).max()
+
+
+@pytest.mark.parametrize("hop", [8, 30, 160, 1806, 4000])
+@pytest.mark.parametrize("lines", [1, 7, 90])
+def test_averages_keep_eight_samples_in_a_period_and_an_even_hop(hop, lines):
+    every = _averaged(hop, lines)
+    assert every >= 1 and hop % (2 * every) == 0
+    assert every == 1 or 2 * hop / every >= 8 * lines
