@@ -128,6 +128,11 @@ class _Builder:
             reference, impedance = rigid_friction(self.step)
             hinge.set("solreffriction", _text(*reference))
             hinge.set("solimpfriction", _text(*impedance))
+        held = "motor" if self.joint.one_body else "link"
+        if name == held and self.joint.has("external_spring"):
+            spring = self.joint.of("external_spring")
+            hinge.set("stiffness", _text(spring["stiffness_nm_rad"]))
+            hinge.set("springref", _text(spring["rest_rad"]))
         size, colour = ("0.05 0.02", "0.3 0.4 0.6 1") if armature else ("0.02 0.1", "0.7 0.5 0.2 1")
         ET.SubElement(
             body, "geom", type="cylinder", size=size, rgba=colour, mass="0",

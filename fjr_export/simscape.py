@@ -173,14 +173,21 @@ def _motor(joint: Joint, made: Laws) -> None:
         f"{_friction(joint, 'motor', 'w', f'max({level}, 0)', made)} + {viscous}"
     )
     on_motor = "drive + te*lever - friction" if not joint.one_body else "drive - friction + load"
-    if joint.one_body and joint.has("gravity"):
-        on_motor += _weight(joint, "th")
+    if joint.one_body:
+        on_motor += _outside(joint, "th")
     made.states = {"th": "w", "w": f"({on_motor})/jm", **made.states}
 
 
-def _weight(joint: Joint, angle: str) -> str:
-    weight = joint.of("gravity")
-    return f" - {weight['torque_nm']!r}*sin({angle} + {weight['angle_rad']!r})"
+def _outside(joint: Joint, angle: str) -> str:
+    """Return the torque of gravity and of a spring to the frame at an angle, with its sign."""
+    torque = ""
+    if joint.has("gravity"):
+        weight = joint.of("gravity")
+        torque += f" - {weight['torque_nm']!r}*sin({angle} + {weight['angle_rad']!r})"
+    if joint.has("external_spring"):
+        spring = joint.of("external_spring")
+        torque += f" - {spring['stiffness_nm_rad']!r}*({angle} - {spring['rest_rad']!r})"
+    return torque
 
 
 def _link(joint: Joint, made: Laws) -> None:
@@ -191,8 +198,7 @@ def _link(joint: Joint, made: Laws) -> None:
     square = joint.of("quadratic_friction")["link_nm_s2_rad2"]
     if square:
         torque += f" - {square!r}*abs(v)*v"
-    if joint.has("gravity"):
-        torque += _weight(joint, "q")
+    torque += _outside(joint, "q")
     if joint.has("extra_mode"):
         mode = joint.of("extra_mode")
         rate = 2.0 * math.pi * mode["frequency_hz"]

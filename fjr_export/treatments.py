@@ -83,6 +83,7 @@ MJCF: Mapping[str, Treatment] = {
     "kinematic_error": _refused("a tendon is linear in the angles"),
     "extra_mode": _native("a third body behind a tendon"),
     "gravity": _native("a torque that is sinusoidal in the angle of the link"),
+    "external_spring": _native("stiffness and springref of the link's joint"),
     "transmission_stiffness": _native("a tendon between two bodies"),
     "torque_bias": _native("a constant torque"),
     "cogging": _native("cogging of a passive DC motor"),
@@ -124,6 +125,7 @@ URDF: Mapping[str, Treatment] = {
     "nonstationary": _refused("parameters there do not change with time"),
     "extra_mode": _refused("the joint moves one body"),
     "gravity": _refused("the mass and its place are not known, only their product"),
+    "external_spring": _refused("a joint there has no spring"),
     **dict.fromkeys(
         (
             *("torque_bias", "cogging", "delay", "actuator_lag", "torque_speed_limit"),
@@ -152,6 +154,7 @@ CONTROL: Mapping[str, Treatment] = {
     "actuator_lag": _native("a state"),
     "torque_gain": _native("gain of the input"),
     "gravity": _equivalent("its slope at angle zero"),
+    "external_spring": _equivalent("its stiffness; what it pulls at angle zero is left out"),
     "nonstationary": _refused("the model does not change with time"),
     **dict.fromkeys(
         (
@@ -179,9 +182,9 @@ SIMSCAPE: Mapping[str, Treatment] = {
             *("viscous_friction", "quadratic_friction", "presliding_friction", "backlash"),
             *("piecewise_stiffness", "asymmetric_stiffness", "cubic_stiffness", "hysteresis"),
             *("transmission_damping", "kinematic_error", "extra_mode", "gravity"),
-            *("transmission_stiffness", "torque_bias", "cogging", "actuator_lag"),
-            *("torque_speed_limit", "dead_band", "torque_constant_ripple", "torque_gain"),
-            "encoder_eccentricity",
+            *("external_spring", "transmission_stiffness", "torque_bias", "cogging"),
+            *("actuator_lag", "torque_speed_limit", "dead_band", "torque_constant_ripple"),
+            *("torque_gain", "encoder_eccentricity"),
         ),
         _native("its equation"),
     ),

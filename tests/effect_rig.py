@@ -59,6 +59,7 @@ MODERATE = {
     },
     "extra_mode": {"inertia_kg_m2": 0.03, "frequency_hz": 30.0, "damping_ratio": 0.02},
     "gravity": {"torque_nm": 3.0, "angle_rad": 0.5},
+    "external_spring": {"stiffness_nm_rad": 40.0, "rest_rad": 0.05},
     "transmission_stiffness": {
         "compliance_rad_nm": 1e-3,
         "link_inertia_share": 0.6,
@@ -170,6 +171,9 @@ class Rig:
             + self.bristle_energy(link, motor, get)
             + 0.5 * get("hysteresis.torque_nm") * get("hysteresis.displacement_rad") * flex**2
             - get("gravity.torque_nm") * math.cos(q + get("gravity.angle_rad"))
+            + 0.5
+            * get("external_spring.stiffness_nm_rad")
+            * (q - get("external_spring.rest_rad")) ** 2
             + ripple / cycles * math.cos(angle)
             + ripple
             * get("cogging.second_ratio")

@@ -155,6 +155,7 @@ FRICTION: tuple[Effect, ...] = (
         "Hamon, Gautier, Garrec 2010, IROS, load-dependent gear friction",
         (size("coefficient", "", "Friction per transmitted torque", 0.0, 0.95, fit=(0.0, 0.5)),),
         ({"coefficient": (0.01, 0.05)},),
+        looks_like="loss that grows with the load",
     ),
     Effect(
         "directional_loss",
@@ -173,8 +174,8 @@ FRICTION: tuple[Effect, ...] = (
             {"forward": (0.01, 0.05), "backward": (0.0,)},
             {"forward": (0.0,), "backward": (0.01, 0.05)},
         ),
+        looks_like="loss that grows with the load",
         same_as="load_friction with all parameters behind the gear scaled, while the motor slides",
-        contains=("load_friction",),
     ),
     Effect(
         "position_friction",

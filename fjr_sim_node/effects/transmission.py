@@ -137,6 +137,22 @@ TRANSMISSION: tuple[Effect, ...] = (
         axis="both",
     ),
     Effect(
+        "external_spring",
+        "A balancer, a hose or a cable pulls the link back as a spring to the frame does.",
+        "link",
+        "plant.torques:link_drive",
+        "slow motion stiffer at every amplitude",
+        "linear torsion spring to the ground (Hooke)",
+        (
+            size("stiffness_nm_rad", "N m/rad", "Stiffness between link and frame", 0.0, 1e9),
+            EffectParameter("rest_rad", 0.0, "rad", "Angle of the link at which it pulls nowhere",
+                            -1e4, 1e4, fit=(-30.0, 30.0)),
+        ),
+        ({"stiffness_nm_rad": (0.01, 0.1), "rest_rad": (0.0,)},),
+        looks_like="constant torque",
+        axis="both",
+    ),
+    Effect(
         "transmission_stiffness",
         "The transmission yields where the datasheet has it rigid.",
         "transmission",

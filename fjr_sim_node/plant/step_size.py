@@ -27,10 +27,11 @@ def pushes(s, torque, w, p, e):
     if p[MOTOR_BRISTLES] != 0.0:
         motor += max(abs(w[1]), motor_level_bound(0.0, p, e))
     link = e[fx.HYSTERESIS_TORQUE_NM]
+    stiffness, rest = e[fx.EXTERNAL_SPRING_STIFFNESS_NM_RAD], e[fx.EXTERNAL_SPRING_REST_RAD]
     if is_rigid(p):
-        motor += e[fx.GRAVITY_TORQUE_NM]
+        motor += e[fx.GRAVITY_TORQUE_NM] + stiffness * abs(s[2] - rest)
     else:
-        link += e[fx.GRAVITY_TORQUE_NM]
+        link += e[fx.GRAVITY_TORQUE_NM] + stiffness * abs(s[0] - rest)
     if p[LINK_BRISTLES] != 0.0:
         link += max(abs(w[0]), p[FS] + e[fx.STRIBECK_FRICTION_LINK_TORQUE_NM])
     if e[fx.EXTRA_MODE_INERTIA_KG_M2] != 0.0:
@@ -103,10 +104,11 @@ def _fastest_rate(stiffness, twist, decay, s, torque, p, e):
             stiffness += e[fx.HYSTERESIS_TORQUE_NM] / e[fx.HYSTERESIS_DISPLACEMENT_RAD]
         mobility = 1.0 / p[J] + ratio * (ratio + load_coefficient(e)) / p[JM]
         decay += e[fx.TRANSMISSION_DAMPING_NM_S_RAD] * mobility
+        outside = e[fx.GRAVITY_TORQUE_NM] + e[fx.EXTERNAL_SPRING_STIFFNESS_NM_RAD]
         if is_rigid(p):
-            motor += e[fx.GRAVITY_TORQUE_NM]
+            motor += outside
         else:
-            link += e[fx.GRAVITY_TORQUE_NM]
+            link += outside
     elif e[fx.FRICTION_ON] != 0.0:
         mobility += load_coefficient(e) / p[JM]
     if e[fx.FRICTION_ON] != 0.0:

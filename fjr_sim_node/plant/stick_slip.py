@@ -181,7 +181,7 @@ def _event_time(which, s, torque, m, w, h, high_value, p, e):
     for _ in range(60):
         before = time
         time = (low * high_value - high * low_value) / (high_value - low_value)
-        if abs(time - before) <= 1e-11 * h:
+        if time == 0.0 or abs(time - before) <= 1e-11 * h:  # 0 by underflow
             break
         s1 = runge_kutta(s, torque, m, w, time, p, e)
         value = _margin(which, s1, torque, m, w, p, e)

@@ -93,6 +93,8 @@ def link_drive(q, vq, te, q3, v3, p, e):
     drive = -te
     if e[fx.GRAVITY_TORQUE_NM] != 0.0:
         drive -= e[fx.GRAVITY_TORQUE_NM] * math.sin(q + e[fx.GRAVITY_ANGLE_RAD])
+    if e[fx.EXTERNAL_SPRING_STIFFNESS_NM_RAD] != 0.0:
+        drive -= e[fx.EXTERNAL_SPRING_STIFFNESS_NM_RAD] * (q - e[fx.EXTERNAL_SPRING_REST_RAD])
     if e[fx.EXTRA_MODE_INERTIA_KG_M2] != 0.0:
         rate = 2.0 * math.pi * e[fx.EXTRA_MODE_FREQUENCY_HZ]
         damping = 2.0 * e[fx.EXTRA_MODE_DAMPING_RATIO] * rate
@@ -152,6 +154,8 @@ def motor_drive(th, vth, te, torque, p, e):
     drive += te * lever(th, e)
     if e[fx.GRAVITY_TORQUE_NM] != 0.0 and is_rigid(p):
         drive -= e[fx.GRAVITY_TORQUE_NM] * math.sin(th + e[fx.GRAVITY_ANGLE_RAD])
+    if e[fx.EXTERNAL_SPRING_STIFFNESS_NM_RAD] != 0.0 and is_rigid(p):
+        drive -= e[fx.EXTERNAL_SPRING_STIFFNESS_NM_RAD] * (th - e[fx.EXTERNAL_SPRING_REST_RAD])
     return drive
 
 

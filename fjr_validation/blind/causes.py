@@ -134,6 +134,13 @@ def _gravity(rng: np.random.Generator, at: Scales) -> Draw:
                   {"gravity_nm": "torque_nm", "gravity_angle_rad": "angle_rad"})  # fmt: skip
 
 
+def _spring(rng: np.random.Generator, at: Scales) -> Draw:
+    rest = at.angle * float(rng.uniform(-2.0, 2.0))
+    return linear("external_spring", {"spring_nm_rad": at.torque / at.angle}, 0.03, 0.5,
+                  {"spring_rest_rad": rest},
+                  {"spring_nm_rad": "stiffness_nm_rad", "spring_rest_rad": "rest_rad"})  # fmt: skip
+
+
 def _delay(_: np.random.Generator, at: Scales) -> Draw:
     return linear("delay", {"delay_s": 1.0 / at.crossover_hz}, 2e-3, 0.06,
                   same_as={"delay_s": "time_s"})  # fmt: skip
@@ -216,6 +223,7 @@ _ANY_AXIS: tuple[Drawer, ...] = (
     _ripple("position_friction", "friction_angle", "nm", 0.2, 0.9, lambda at: at.coulomb),
     _drag,
     _gravity,
+    _spring,
     _ripple("cogging", "cogging", "nm", 0.03, 0.5, lambda at: at.torque),
     _delay,
     _lag,
@@ -258,7 +266,7 @@ def drawers(*, rigid: bool, stationary: bool) -> tuple[Drawer, ...]:
 FAMILIES: tuple[frozenset[str], ...] = tuple(
     frozenset(names)
     for names in (
-        ("asymmetric_friction", "torque_bias", "gravity"),
+        ("asymmetric_friction", "torque_bias", "gravity", "external_spring"),
         ("backlash", "piecewise_stiffness", "asymmetric_stiffness", "cubic_stiffness"),
         ("delay", "actuator_lag", "torque_slew_limit"),
         ("position_friction", "cogging", "torque_constant_ripple", "kinematic_error"),

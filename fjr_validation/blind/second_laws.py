@@ -49,6 +49,7 @@ SETTINGS: tuple[str, ...] = (
     "slew_nm_s", "deadband_nm", "stiffness_asymmetry",
     "ripple_relative", "ripple_cycles", "ripple_phase_rad",
     "loss_forward", "loss_backward", "stall_nm", "no_load_rad_s",
+    "spring_nm_rad", "spring_rest_rad",
     "eyring_nm", "eyring_rad_s", "eddy_nm", "eddy_rad_s",
     "cable_nm_rad", "cable_time_s", "cushion_nm_rad2", "cushion_rad",
     "heating_relative", "heating_nm", "heating_time_s", "bending_nm_s_rad", "bending_rad",
@@ -62,9 +63,10 @@ SETTINGS: tuple[str, ...] = (
     HYST, HYST_RAD, FLEX_DAMPING, KIN, KIN_CYCLES, KIN_PHASE, MODE, MODE_HZ, MODE_DAMPING,
     GRAVITY, GRAVITY_ANGLE, COG, COG_CYCLES, COG_PHASE, DELAY, LAG, LIMIT, RESOLUTION,
     ECC, ECC_PHASE, DRIFT, DRIFT_TIME, SLEW, DEADBAND, K_ASYM, RIPPLE, RIPPLE_CYCLES, RIPPLE_PHASE,
-    LOSS_FORWARD, LOSS_BACKWARD, STALL, NO_LOAD, EYRING, EYRING_V, EDDY, EDDY_V,
-    CABLE, CABLE_TIME, CUSHION, CUSHION_RAD, HEATING, HEATING_NM, HEATING_TIME, BENDING,
-    BENDING_RAD, INTERPOLATION, INTERPOLATION_CYCLES, WANDER, JITTER,
+    LOSS_FORWARD, LOSS_BACKWARD, STALL, NO_LOAD, SPRING, SPRING_REST,
+    EYRING, EYRING_V, EDDY, EDDY_V, CABLE, CABLE_TIME, CUSHION, CUSHION_RAD,
+    HEATING, HEATING_NM, HEATING_TIME, BENDING, BENDING_RAD,
+    INTERPOLATION, INTERPOLATION_CYCLES, WANDER, JITTER,
 ) = range(len(SETTINGS))  # fmt: skip
 
 PLANT_NAMES = ("jm", "j", "fs", "fsm", "fv", "fvm", "k0", "k1")
@@ -198,6 +200,7 @@ def outer_load(angle, cable, wander, s):
     if s[GRAVITY] != 0.0:
         across = math.cos(s[GRAVITY_ANGLE]) * math.sin(angle)
         torque -= s[GRAVITY] * (across + math.sin(s[GRAVITY_ANGLE]) * math.cos(angle))
+    torque -= s[SPRING] * angle - s[SPRING] * s[SPRING_REST]
     if s[CABLE] != 0.0:
         torque -= s[CABLE] * (angle - cable)
     if s[CUSHION] != 0.0 and angle > s[CUSHION_RAD]:

@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from scipy.stats import chi2
 
 from fjr_sim_node import effects as fx
 
@@ -91,8 +92,7 @@ def _beside_zero(linear: Estimate, fit: Fit, without: float) -> Estimate:
     """
     if not linear.low <= 0.0 <= linear.high:
         return linear
-    left = max(1.0, fit.train_chi2 / fit.solution.residuals.size)
-    fall = max(without - fit.train_chi2, 0.0) / left
+    fall = _fall(fit, without)
     if fall <= _NORMAL_95**2:
         return linear
     nearest = linear.value * (1.0 - _NORMAL_95 / np.sqrt(fall))
@@ -101,22 +101,33 @@ def _beside_zero(linear: Estimate, fit: Fit, without: float) -> Estimate:
     return linear.model_copy(update={"high": nearest})
 
 
+def _fall(fit: Fit, without: float) -> float:
+    """Return an effect's likelihood ratio statistic, the variance being what the fit leaves."""
+    left = max(1.0, fit.train_chi2 / fit.solution.residuals.size)
+    return max(without - fit.train_chi2, 0.0) / left
+
+
 def sure(fit: Fit, groups: np.ndarray) -> bool:
-    """Tell whether every effect of a fit is there: the interval of one of its sizes lacks zero.
+    """Tell whether every effect of a fit is there.
+
+    The interval of one of its sizes lacks zero; of several that only together are known, such as
+    those of a loss forward and backward, the likelihood ratio tells it.
 
     Args:
         fit: an explanation.
         groups: as for `estimates`.
     """
     found = estimates(fit, groups)
-    return all(
-        any(
-            not found[name].low <= 0.0 <= found[name].high
-            for name in fx.EFFECTS[effect].size_names
-            if name in found
-        )
-        for effect in fit.effects
-    )
+
+    def is_there(effect: str) -> bool:
+        sizes = [name for name in fx.EFFECTS[effect].size_names if name in found]
+        if any(not found[name].low <= 0.0 <= found[name].high for name in sizes):
+            return True
+        if len(sizes) < 2 or effect not in fit.without:
+            return False
+        return _fall(fit, fit.without[effect]) > chi2.isf(0.05, len(sizes))
+
+    return all(is_there(effect) for effect in fit.effects)
 
 
 def relative_scatter(bags: Bags | None) -> dict[str, float]:

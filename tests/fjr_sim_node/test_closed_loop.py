@@ -9,8 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from controller_node import pd_filtered
+from controller_node.transfer_function import TransferFunction
 from excitation_node import multisine
 from fjr_kit.errors import InputError
+from fjr_sim_node import effects as fx
 from fjr_sim_node import plant
 from fjr_sim_node.simulation import closed_loop
 from fjr_sim_node.simulation.simulator import SIMULATOR, run_realization
@@ -176,3 +178,23 @@ def test_a_description_without_controller_is_refused():
     experiment = multisine.describe(multisine.EXCITATION.defaults(), 0, 0)
     with pytest.raises(InputError, match="controller is missing"):
         run_realization(SIMULATOR.defaults(), experiment)
+
+
+def test_a_motion_below_the_least_double_is_simulated():
+    axis = {"jm": 0.12347, "fsm": 0.16, "fvm": 0.389}
+    nothing = {"j": 0.0, "k0": np.inf, "k1": 0.0, "fs": 0.0, "fv": 0.0}
+    effects = {
+        "presliding_friction.motor_rad": 5.6e-4,
+        "actuator_lag.time_constant_s": 1.4e-3,
+    }
+    torque = np.zeros(36)
+    torque[31:] = 9.881e-324, -2.470e-323, 9.387e-323, -3.409e-322, 1.265e-321
+    out = closed_loop.simulate_law(
+        np.zeros(36),
+        800.0,
+        plant.coefficients({**nothing, **axis, **effects}),
+        TransferFunction.of([16651.48779578, -15063.04760205], [1.0, -0.33257325]),
+        effects=fx.coefficients(effects),
+        added_torque=torque,
+    )
+    assert np.isfinite(out.position).all()

@@ -470,6 +470,30 @@ def test_gravity_of_a_rigid_axis_is_held_by_its_friction_up_to_its_level():
         assert (moved == 0.0) == sticks
 
 
+def test_a_spring_to_the_frame_swings_the_free_link_about_its_rest():
+    on = named("external_spring", stiffness_nm_rad=7.0, rest_rad=0.2)
+    for axis, inertia, at in ((APART, J, 0), ({"k0": math.inf}, J + JM, 2)):
+        body = Rig({**axis, **FRICTIONLESS}, on).start(q=0.5, th=0.5)
+        before = body.energy()
+        state = body.hold(0.0, math.pi * math.sqrt(inertia / 7.0), parts=2000)
+        assert state[at] == pytest.approx(0.2 - 0.3, rel=1e-6)
+        assert state[at + 1] == pytest.approx(0.0, abs=1e-4)
+        assert body.energy() == pytest.approx(before, rel=1e-9)
+
+
+def test_a_spring_to_the_frame_is_gravity_of_small_travel():
+    torque = 20.0 * np.random.default_rng(5).standard_normal(300)
+    for axis in ({}, {"k0": math.inf}):
+        on = (
+            named("external_spring", stiffness_nm_rad=40.0, rest_rad=0.0),
+            named("gravity", torque_nm=40.0, angle_rad=0.0),
+            {},
+        )
+        spring, weight, bare = (Rig(FRICTIONLESS | axis, e).play(torque)[:, 2] for e in on)
+        assert 1e-3 < np.abs(spring).max() < 0.1
+        assert np.abs(spring - weight).max() < 0.01 * np.abs(spring - bare).max()
+
+
 @pytest.mark.parametrize(("on", "bare"), [
     (named("coulomb_friction", motor_nm=2.0, link_nm=1.5), {"fsm": 2.0, "fs": 1.5}),
     (named("viscous_friction", motor_nm_s_rad=1.0, link_nm_s_rad=3.0), {"fvm": 1.0, "fv": 3.0}),

@@ -70,10 +70,10 @@ def test_starts_name_parameters_of_their_effect_within_their_bounds() -> None:
 def test_what_an_effect_contains_is_another_effect_of_the_table() -> None:
     for effect in fx.CATALOGUE:
         assert set(effect.contains) <= set(fx.EFFECTS) - {effect.identifier}
-    assert fx.contains(("directional_loss",), ("load_friction",))
-    assert fx.contains(("delay", "directional_loss"), ("load_friction", "delay"))
-    assert not fx.contains(("load_friction",), ("directional_loss",))
-    assert not fx.contains(("delay", "directional_loss"), ("load_friction",))
+    assert fx.contains(("torque_speed_limit",), ("torque_saturation",))
+    assert fx.contains(("delay", "torque_speed_limit"), ("torque_saturation", "delay"))
+    assert not fx.contains(("torque_saturation",), ("torque_speed_limit",))
+    assert not fx.contains(("delay", "torque_speed_limit"), ("torque_saturation",))
 
 
 def test_near_equivalents_are_mutual_and_never_the_effect_itself() -> None:
