@@ -24,17 +24,15 @@ from .which.catalogue import catalogue
 from .which.cell_fits import CellFit, CellFitter
 from .which.equivalents import founded, partners
 from .which.estimates import moved_by_scatter, relative_scatter
+from .which.run_scatter import SCATTER
 from .which.search_space import TOLERANCE
 from .which.stepwise import Found, Stepwise, gain, stands_for
 
 Progress = Callable[[str], None]
 
-ASSUMED_SCATTER = 0.03
-"""Standard deviation of friction from run to run where the runs cannot show it, relative: that of
-drives is one to five percent."""
 ASSUMED = (
     "How far friction scatters from run to run cannot be seen in these runs; the intervals allow "
-    f"for {100 * ASSUMED_SCATTER:.0f} %. Two runs more than levels that all move enough show it."
+    f"for {100 * SCATTER:.0f} %. Two runs more than levels that all move enough show it."
 )
 
 LEAST_SAMPLES = 64
@@ -189,7 +187,7 @@ def _run_scatter(
     """Return how far parameters scatter from run to run, seen or assumed, and sentences on it."""
     changes = record_changes(fitter.evidence, best.variance, best.model)
     if changes is None:
-        scatter = dict.fromkeys(GROUPS["friction"], ASSUMED_SCATTER)
+        scatter = dict.fromkeys(GROUPS["friction"], SCATTER)
         if not moved_by_scatter(best, fitter.runs, scatter).any():
             return None, {}, []
         return None, scatter, [ASSUMED]

@@ -127,18 +127,19 @@ def tested_causes(
         refit: of the base parameters alone.
         scatter: of parameters from run to run, see `moved_by_scatter`.
     """
-    estimates = cell_estimates(fit, fitter, scatter)
     ledger = Ledger(fitter.evidence, fitter.select_parts)
+    fewer = {effect: fitter.without(fit, effect) for effect in fit.effects}
+    estimates = cell_estimates(fit, fitter, scatter, fewer)
     found = []
-    for effect in fit.effects:
-        without = fitter.without(fit, effect)
+    for effect, without in fewer.items():
+        there = beyond_zero(effect, estimates, fitter.fall(fit, without))
         found.append(
             Tested(
                 effect,
                 gain(fitter, fit, without, fitter.acted(fit, effect)),
                 without,
                 invariance(fitter, fit, effect, scatter),
-                beyond_zero(effect, estimates) and not at_its_bound(fit, effect),
+                there and not at_its_bound(fit, effect),
                 ledger.share(without.model, fit.model, refit.model),
                 fitter.closed(fit, without),
             )
@@ -171,7 +172,7 @@ def judge_records(
     evidence, best, refit = fitter.evidence, found.best, found.steps[0]
     ledger = Ledger(evidence)
     thin = len(evidence.parts_for("select")) < FEWEST_PARTS
-    estimates = cell_estimates(best, fitter, scatter)
+    estimates = cell_estimates(best, fitter, scatter, {t.effect: t.without for t in tested})
     causes = (
         [] if thin else [_cause(t, fitter, ledger, found, alternatives, estimates) for t in tested]
     )

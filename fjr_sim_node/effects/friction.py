@@ -16,7 +16,7 @@ def _stribeck(side: str) -> tuple[EffectParameter, ...]:
         size("torque_nm", "N m", f"Breakaway above Coulomb friction, {side} side"),
         EffectParameter(
             "velocity_rad_s", 0.1, "rad/s", "Stribeck velocity, where it has fallen to 1/e",
-            1e-4, 100.0, fit=(1e-3, 0.6),
+            1e-4, 100.0, fit=(1e-3, 2.0),
         ),
     )  # fmt: skip
 
@@ -134,7 +134,7 @@ FRICTION: tuple[Effect, ...] = (
             EffectParameter("bristle_nm_rad", math.inf, "N m/rad", "Stiffness of the bristles, "
                             "sigma0; .inf: none", 1e-3, role="limit", fit=(0.01, 1e3)),
             EffectParameter("velocity_rad_s", 0.1, "rad/s", "Stribeck velocity, where it has "
-                            "fallen to 1/e", 1e-4, 100.0, fit=(1e-3, 0.6)),
+                            "fallen to 1/e", 1e-4, 100.0, fit=(1e-3, 2.0)),
             EffectParameter("damping_nm_s_rad", 0.0, "N m s/rad", "Damping of the bristles, "
                             "sigma1, while they bend further", 0.0, 1e4),
         ),

@@ -28,6 +28,7 @@ from ..model.evidence import Evidence
 from ..model.simulated_rig import Model
 from .least_squares import Solution, solve
 from .ripples_of_records import RecordRipples
+from .run_scatter import beside_scatter, deviated
 from .scales import Scales
 from .screening import Proposal, Screening
 from .search_space import Space, space_for, starts
@@ -110,6 +111,9 @@ class CellFitter:
         levels = [evidence.records.levels.index(evidence.parts[p].level) for p in self.select_parts]
         self._select_levels = np.array(levels)
         self._select_floor = self._floor.reshape(-1, evidence.bands)[levels]
+        self._select_cell = evidence.cell_of(self.select_parts)
+        select_run = np.array([p.record for p in evidence.parts])[evidence.part_of(self.select_parts)]
+        self._unseen = [select_run == run for run in np.setdiff1d(select_run, self.runs)]
         records = evidence.records
         self.scales = Scales.of_record(
             [r.position for r in records.records],
@@ -239,6 +243,16 @@ class CellFitter:
         errors = self.evidence.errors([space.model(start)], self.fit_parts)[0]
         return self._reweighted(rest, space, start, self._variance(errors), _REFIT_ROUNDS)
 
+    def fall(self, fit: CellFit, without: CellFit) -> float:
+        """Return by how much twice the negative log-likelihood of the fitted parts falls.
+
+        Args:
+            fit: with an effect.
+            without: the fit that lacks it.
+        """
+        ratio = np.log(without.variance / fit.variance)
+        return max(float(self._numbers(fit.variance) @ ratio), 0.0)
+
     def misfit(self, fit: CellFit) -> float:
         """Return what a fit leaves on unseen parts over noise and the simulation's own error.
 
@@ -298,10 +312,13 @@ class CellFitter:
         share = self._numbers(variance) / np.maximum(self._count, 1)
         return np.sqrt(share / variance)[self._cell]
 
-    def _left(self, model: Model) -> np.ndarray:
+    def _left(self, model: Model, variance: np.ndarray) -> np.ndarray:
         parts = self.select_parts
-        errors = self.evidence.errors([model], parts)[0]
-        return self._mean_squares(errors) + self._select_floor
+        others = deviated(model) if self._unseen else []
+        errors = self.evidence.errors([model, *others], parts)
+        share = self._numbers(variance) / np.maximum(self._count, 1)
+        weight = np.sqrt(share / variance)[self._select_cell]
+        return self._mean_squares(beside_scatter(errors, weight, self._unseen)) + self._select_floor
 
     def _mean_squares(self, values: np.ndarray) -> np.ndarray:
         """Return the mean square of numbers on the parts that select, (parts, bands)."""
@@ -373,7 +390,7 @@ class CellFitter:
         left = errors * self.weight(variance)
         ended = replace(solution, residuals=left, jacobian=known, cost=float(left @ left))
         model = space.model(x)
-        return CellFit(effects, space, model, ended, variance, self._left(model))
+        return CellFit(effects, space, model, ended, variance, self._left(model, variance))
 
 
 def _independent(noise: np.ndarray, lines: np.ndarray, coherent: np.ndarray) -> np.ndarray:

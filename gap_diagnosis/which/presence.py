@@ -17,7 +17,16 @@ from fjr_sim_node import effects as fx
 
 from ..outcome.diagnosis import Estimate
 from .cell_fits import CellFit, CellFitter
-from .estimates import deviations, linear_estimates, moved_by_scatter, standard_errors
+from .estimates import (
+    FORM_BESIDE,
+    deviations,
+    form,
+    kept_from_zero,
+    linear_estimates,
+    moved_by_scatter,
+    standard_errors,
+    together_sure,
+)
 
 LEAST_INVARIANCE_P = 0.01
 _SAME = 0.05  # relative: sizes that differ by no more are the same, since friction scatters
@@ -25,7 +34,7 @@ _AT_BOUND = 1e-3  # relative
 
 
 def cell_estimates(
-    fit: CellFit, fitter: CellFitter, scatter: Mapping[str, float]
+    fit: CellFit, fitter: CellFitter, scatter: Mapping[str, float], without: Mapping[str, CellFit]
 ) -> dict[str, Estimate]:
     """Return all free parameters with their 95 % intervals, cut at their bounds.
 
@@ -33,21 +42,32 @@ def cell_estimates(
         fit: an explanation.
         fitter: that made it.
         scatter: standard deviations of parameters from run to run, see `moved_by_scatter`.
+        without: the fits that lack one of its effects, by that.
     """
     std = standard_errors(fit.solution.jacobian, fit.solution.residuals, fitter.groups)
     moved = moved_by_scatter(fit, fitter.runs, scatter)
-    return linear_estimates(fit, np.hypot(std, moved))
+    linear = linear_estimates(fit, np.sqrt(std**2 + moved**2 + form(fit, FORM_BESIDE) ** 2))
+    fallen = {effect: fitter.fall(fit, other) for effect, other in without.items()}
+    return kept_from_zero(linear, fallen)
 
 
-def beyond_zero(effect: str, found: dict[str, Estimate]) -> bool:
-    """Tell whether the interval of one of an effect's sizes lacks the value that means off."""
-    for name in fx.EFFECTS[effect].size_names:
-        if name not in found:
-            continue
+def beyond_zero(effect: str, found: Mapping[str, Estimate], fall: float) -> bool:
+    """Tell whether an effect's sizes are known not to mean that it is off.
+
+    The interval of one of them lacks that value; of several that only together are known, the
+    likelihood ratio tells it.
+
+    Args:
+        effect: its identifier.
+        found: parameters with their intervals.
+        fall: see `CellFitter.fall`, of the fit without the effect.
+    """
+    sizes = [name for name in fx.EFFECTS[effect].size_names if name in found]
+    for name in sizes:
         estimate, off = found[name], float(fx.parameter(name).default)
         if math.isinf(off) or not estimate.low <= off <= estimate.high:
             return True
-    return False
+    return len(sizes) > 1 and together_sure(fall, len(sizes))
 
 
 def at_its_bound(fit: CellFit, effect: str) -> bool:

@@ -37,6 +37,9 @@ TIED_SHARE = 0.15
 TIED_P = 0.1
 """...or by less than half of it and unseen parts do not show the difference."""
 
+_FEW = 5  # parts: of fewer no rank test is sure
+_COUNTED = 5.0  # nats, the most that one of few parts counts
+
 _MUCH_LESS = 0.3  # of the greatest gain: a cause that gains less waits for the next step
 _NEUTRAL = 0.02  # of the greatest gain of a part: parts that change by less say nothing
 
@@ -52,7 +55,7 @@ class Gain:
         without_best: the same without the part that gains most.
         share: of the parts that gain in the sum of ranks, ranked by how much each changes: a part
             at rest shows little but where friction happened to stop the motion.
-        p: p-value of Wilcoxon's signed-rank test of these parts against no gain.
+        p: p-value of these parts against no gain, see `_p_value`.
     """
 
     mean: float
@@ -90,8 +93,26 @@ def gain(
         float(difference.mean()),
         float(np.delete(difference, most).mean()),
         float(ranks[telling > 0.0].sum() / ranks.sum()),
-        float(stats.wilcoxon(telling, alternative="greater").pvalue),
+        _p_value(telling),
     )
+
+
+def _p_value(gains: np.ndarray) -> float:
+    """Return how often chance makes unseen parts gain as often and as much as they do.
+
+    By Wilcoxon's signed-rank test. An effect that acts in few parts, such as a limit that is
+    reached twice, cannot pass that however much these gain: all of them must gain then, and the
+    likelihood ratio on unseen parts, to which each adds a bounded amount, is an e-value, whose
+    inverse bounds the p-value (Vovk, Wang 2021, Annals of Statistics 49(3)).
+
+    Args:
+        gains: of log-likelihood, nats.
+    """
+    if gains.size >= _FEW:
+        return float(stats.wilcoxon(gains, alternative="greater").pvalue)
+    if gains.min() <= 0.0:
+        return 1.0
+    return float(np.exp(-np.minimum(gains, _COUNTED).sum()))
 
 
 @dataclass

@@ -20,8 +20,8 @@ from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.model.simulated_rig import Model
 from gap_diagnosis.notes import at_limits
 from gap_diagnosis.outcome.diagnosis import Figure
-from gap_diagnosis.record_investigation import ASSUMED_SCATTER
 from gap_diagnosis.which.cell_fits import CellFitter, _independent
+from gap_diagnosis.which import run_scatter
 from gap_diagnosis.which.presence import at_its_bound, beyond_zero, cell_estimates, invariance
 from gap_diagnosis.which.stepwise import Gain, Stepwise, gain
 
@@ -29,7 +29,7 @@ RATE, NOISE = 500.0, 2e-5
 LAW = pd_filtered.CONTROLLER.check({"sample_rate_hz": RATE})
 NOMINAL = {name: float(value) for name, value in PLANT.defaults().items()}
 BIAS = {"torque_bias.torque_nm": 1.5}
-SCATTER = dict.fromkeys(GROUPS["friction"], ASSUMED_SCATTER)
+SCATTER = dict.fromkeys(GROUPS["friction"], run_scatter.SCATTER)
 
 
 def reference(seed: int, samples: int, rms_rad: float) -> np.ndarray:
@@ -127,10 +127,10 @@ def test_a_cause_is_fitted_beside_friction_that_scatters():
     fitter, refit, fit = biased()
     found = gain(fitter, fit, refit)
     assert found.present and found.share == 1.0
-    found = cell_estimates(fit, fitter, SCATTER)
+    found = cell_estimates(fit, fitter, SCATTER, {"torque_bias": refit})
     bias = found["torque_bias.torque_nm"]
     assert bias.low <= 1.5 <= bias.high and bias.high - bias.low < 0.3
-    assert beyond_zero("torque_bias", found)
+    assert beyond_zero("torque_bias", found, fitter.fall(fit, refit))
     assert not at_its_bound(fit, "torque_bias")
 
 
@@ -142,7 +142,7 @@ def test_intervals_of_few_runs_allow_for_friction_that_scatters():
         fitter = CellFitter(Evidence(records(BIAS, scatter=0.02, seed=seed), NOMINAL), NOMINAL, 0.1)
         refit = fitter.refit()
         fit = fitter.add(refit, "torque_bias", fitter.screening(refit, "torque_bias").proposals())
-        found = cell_estimates(fit, fitter, SCATTER)
+        found = cell_estimates(fit, fitter, SCATTER, {"torque_bias": refit})
         for name in held:
             held[name] += found[name].low <= truth[name] <= found[name].high
     assert held["fs"] >= 8 and held["fsm"] >= 8, held
