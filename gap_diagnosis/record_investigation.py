@@ -24,7 +24,7 @@ from .which.catalogue import catalogue
 from .which.cell_fits import CellFit, CellFitter
 from .which.equivalents import founded, partners
 from .which.estimates import moved_by_scatter, relative_scatter
-from .which.run_scatter import SCATTER
+from .which.unseen_friction import SCATTER
 from .which.search_space import TOLERANCE
 from .which.stepwise import Found, Stepwise, gain, stands_for
 

@@ -28,7 +28,7 @@ from ..model.evidence import Evidence
 from ..model.simulated_rig import Model
 from .least_squares import Solution, solve
 from .ripples_of_records import RecordRipples
-from .run_scatter import beside_scatter, deviated
+from .unseen_friction import beside_scatter, deviated
 from .scales import Scales
 from .screening import Proposal, Screening
 from .search_space import Space, space_for, starts

@@ -21,7 +21,7 @@ from gap_diagnosis.model.simulated_rig import Model
 from gap_diagnosis.notes import at_limits
 from gap_diagnosis.outcome.diagnosis import Figure
 from gap_diagnosis.which.cell_fits import CellFitter, _independent
-from gap_diagnosis.which import run_scatter
+from gap_diagnosis.which import unseen_friction
 from gap_diagnosis.which.presence import at_its_bound, beyond_zero, cell_estimates, invariance
 from gap_diagnosis.which.stepwise import Gain, Stepwise, gain
 
@@ -29,7 +29,7 @@ RATE, NOISE = 500.0, 2e-5
 LAW = pd_filtered.CONTROLLER.check({"sample_rate_hz": RATE})
 NOMINAL = {name: float(value) for name, value in PLANT.defaults().items()}
 BIAS = {"torque_bias.torque_nm": 1.5}
-SCATTER = dict.fromkeys(GROUPS["friction"], run_scatter.SCATTER)
+SCATTER = dict.fromkeys(GROUPS["friction"], unseen_friction.SCATTER)
 
 
 def reference(seed: int, samples: int, rms_rad: float) -> np.ndarray:
