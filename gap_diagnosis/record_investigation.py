@@ -24,9 +24,9 @@ from .which.catalogue import catalogue
 from .which.cell_fits import CellFit, CellFitter
 from .which.equivalents import founded, partners
 from .which.estimates import moved_by_scatter, relative_scatter
-from .which.unseen_friction import SCATTER
 from .which.search_space import TOLERANCE
 from .which.stepwise import Found, Stepwise, gain, stands_for
+from .which.unseen_friction import SCATTER
 
 Progress = Callable[[str], None]
 
@@ -208,6 +208,8 @@ def _kept(
     if len(fitter.evidence.parts_for("select")) < FEWEST_PARTS:
         return replace(found, steps=found.steps[:1]), []
     steps, tested = list(found.steps), []
+    if not steps[-1].solution.converged:
+        steps[-1] = fitter.further(steps[-1])
     while steps[-1].effects:
         progress(f"tests of {' + '.join(steps[-1].effects)}")
         tested = tested_causes(fitter, steps[-1], steps[0], scatter)
@@ -298,6 +300,11 @@ def _notes(evidence: Evidence, found: Found) -> list[str]:
         )
     best = found.best
     notes += at_limits(best.space, best.solution.x, best.model.plant)
+    if best.effects and not best.solution.converged:
+        notes.append(
+            f"The fit of {' + '.join(best.effects)} has not converged: the sizes, and their "
+            "intervals, are those of where it was ended."
+        )
     if not found.complete:
         notes.append(OUT_OF_TIME)
     return notes

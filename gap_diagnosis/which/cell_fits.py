@@ -28,10 +28,11 @@ from ..model.evidence import Evidence
 from ..model.simulated_rig import Model
 from .least_squares import Solution, solve
 from .ripples_of_records import RecordRipples
-from .unseen_friction import beside_scatter, deviated
+from .ripples_seen import SeenRipples
 from .scales import Scales
 from .screening import Proposal, Screening
 from .search_space import Space, space_for, starts
+from .unseen_friction import beside_scatter, deviated
 
 _REFIT_ROUNDS = (8, 5, 5)
 _ADDED_ROUNDS = (6, 4)
@@ -88,7 +89,7 @@ class CellFitter:
         self.evidence, self.nominal, self.tolerance = evidence, dict(nominal), tolerance
         self.fit_parts = evidence.parts_for("fit")
         self.select_parts = evidence.parts_for("select") or self.fit_parts
-        self._rippled: tuple[CellFit, RecordRipples] | None = None
+        self._rippled: tuple[CellFit, tuple[RecordRipples, SeenRipples]] | None = None
         self._cell = evidence.cell_of(self.fit_parts)
         self._count = np.bincount(self._cell, minlength=evidence.cells)
         levels = [evidence.records.levels.index(evidence.parts[p].level) for p in self.fit_parts]
@@ -112,7 +113,9 @@ class CellFitter:
         self._select_levels = np.array(levels)
         self._select_floor = self._floor.reshape(-1, evidence.bands)[levels]
         self._select_cell = evidence.cell_of(self.select_parts)
-        select_run = np.array([p.record for p in evidence.parts])[evidence.part_of(self.select_parts)]
+        select_run = np.array([p.record for p in evidence.parts])[
+            evidence.part_of(self.select_parts)
+        ]
         self._unseen = [select_run == run for run in np.setdiff1d(select_run, self.runs)]
         records = evidence.records
         self.scales = Scales.of_record(
@@ -159,13 +162,18 @@ class CellFitter:
 
     def screening(self, parent: CellFit, effect: str) -> Screening:
         """Return what the starts of an effect promise beside a fit."""
-        cycles = None
+        cycles, seen = None, []
         if fx.EFFECTS[effect].ripple:
-            cycles = self._ripples(parent).cycles(effect, self.scales.cycles(), RIPPLES_TRIED)
+            tried = self.scales.cycles()
+            predicted, along = self._ripples(parent)
+            cycles, seen = (
+                predicted.cycles(effect, tried, RIPPLES_TRIED),
+                along.seeds(effect, tried),
+            )
         return Screening(
             parent.solution,
             parent.model,
-            starts(effect, self.scales, cycles, self.nominal),
+            [*starts(effect, self.scales, cycles, self.nominal), *seen],
             partial(self._space, parent),
             partial(self._residuals, parent.variance),
             partial(self._costs, parent.variance),
@@ -325,11 +333,11 @@ class CellFitter:
         squares = np.bincount(self._select_bins, values**2, self._counts.size)
         return squares.reshape(self._counts.shape) / self._counts
 
-    def _ripples(self, parent: CellFit) -> RecordRipples:
+    def _ripples(self, parent: CellFit) -> tuple[RecordRipples, SeenRipples]:
         if self._rippled is None or self._rippled[0] is not parent:
             weight, solution = self.weight(parent.variance), parent.solution
-            ripples = RecordRipples(self.evidence, self.fit_parts, parent.model, weight, solution)
-            self._rippled = parent, ripples
+            at = self.evidence, self.fit_parts, parent.model
+            self._rippled = parent, (RecordRipples(*at, weight, solution), SeenRipples(*at))
         return self._rippled[1]
 
     def _space(self, parent: CellFit, seed: Mapping[str, float]) -> Space:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -25,6 +26,9 @@ _TRIED = 6
 _SCALED = 2
 _FOLLOW = 0.1  # how far a parameter of the parent may follow, relative
 
+_Base = Literal["following", "kept", "datasheet"]
+"""Base parameters beside a candidate: the parent's, as these would follow it; the parent's as they
+are; the datasheet's."""
 Errors = Callable[[Sequence[Model]], np.ndarray]
 Costs = Callable[[np.ndarray], np.ndarray]
 """Takes errors, (models, errors) in standard deviations; returns what each costs, (models,)."""
@@ -99,9 +103,10 @@ class Screening:
         """
         chosen = self._candidates[:_TRIED]
         self._tries.run([(c, size) for c in chosen for size in sorted({c.size, 1.0})])
-        self._tries.run([(c, 1.0) for c in chosen], follow=False)
+        self._tries.run([(c, 1.0) for c in chosen], "kept")
         best = self._tries.best(_SCALED)
         self._tries.run([(c, c.size * factor) for c in best for factor in _SIZES])
+        self._tries.run_straightened(best)
         return self._tries.proposals()
 
 
@@ -122,12 +127,12 @@ class _Tries:
         self._spaces: dict[int, Space] = {}
         self._found: list[tuple[float, _Candidate, np.ndarray]] = []
 
-    def run(self, tries: Sequence[tuple[_Candidate, float]], follow: bool = True) -> None:
-        """Evaluate candidates at sizes, the base parameters following or as they were."""
+    def run(self, tries: Sequence[tuple[_Candidate, float]], base: _Base = "following") -> None:
+        """Evaluate candidates at sizes, with base parameters of some kind."""
         tries = [(c, size) for c, size in tries if 1e-3 < abs(size) < 30.0]
         if not tries:
             return
-        points = [self._point(candidate, size, follow) for candidate, size in tries]
+        points = [self._point(candidate, size, base) for candidate, size in tries]
         trials = self._errors(
             [self._space(c).model(p) for (c, _), p in zip(tries, points, strict=True)]
         )
@@ -150,12 +155,27 @@ class _Tries:
             self._spaces[id(candidate)] = self._space_of(candidate.seed)
         return self._spaces[id(candidate)]
 
-    def _point(self, candidate: _Candidate, size: float, follow: bool) -> np.ndarray:
-        """Return the seed with its sizes scaled and, if they follow, the parent's parameters."""
+    def run_straightened(self, candidates: Sequence[_Candidate]) -> None:
+        """Evaluate candidates beside the datasheet, where the parent's parameters leave it far.
+
+        A refit bends all parameters to do what a large effect does; the fit would then begin with
+        the effect twice, and may never find its way back.
+        """
+        for candidate in candidates:
+            space = self._space(candidate)
+            bent = np.abs(self._parent.x[: len(space.nominal)]) > np.log1p(space.tolerance)
+            if bent.any():
+                sizes = sorted({candidate.size, 1.0, 2.0})
+                self.run([(candidate, size) for size in sizes], "datasheet")
+
+    def _point(self, candidate: _Candidate, size: float, base: _Base) -> np.ndarray:
+        """Return the seed with its sizes scaled, and the parameters of the parent."""
         space, parents = self._space(candidate), self._parent.x.size
         seed = {n: v * size if _scales(n) else v for n, v in candidate.seed.items()}
         point = space.point(beside(self._model, seed))
-        if follow:
+        if base == "datasheet":
+            point[: len(space.nominal)] = 0.0
+        if base == "following":
             step = self._inverse @ -(self._parent.residuals + size * candidate.change)
             point[:parents] += np.clip(step, -_FOLLOW, _FOLLOW)
         return np.clip(point, *space.bounds())

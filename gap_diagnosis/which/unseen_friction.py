@@ -44,7 +44,9 @@ def deviated(model: Model) -> list[Model]:
     return found
 
 
-def beside_scatter(errors: np.ndarray, weight: np.ndarray, runs: Sequence[np.ndarray]) -> np.ndarray:
+def beside_scatter(
+    errors: np.ndarray, weight: np.ndarray, runs: Sequence[np.ndarray]
+) -> np.ndarray:
     """Return the errors of a model without what the friction of each run explains.
 
     Args:

@@ -20,8 +20,8 @@ from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.model.simulated_rig import Model
 from gap_diagnosis.notes import at_limits
 from gap_diagnosis.outcome.diagnosis import Figure
-from gap_diagnosis.which.cell_fits import CellFitter, _independent
 from gap_diagnosis.which import unseen_friction
+from gap_diagnosis.which.cell_fits import CellFitter, _independent
 from gap_diagnosis.which.presence import at_its_bound, beyond_zero, cell_estimates, invariance
 from gap_diagnosis.which.stepwise import Gain, Stepwise, gain
 

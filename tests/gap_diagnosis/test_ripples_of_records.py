@@ -27,7 +27,7 @@ def test_ripples_are_proposed_near_enough_for_the_fit_to_find_them(effect):
     named = {f"{effect}.{name}": value for name, value in truth.items()}
     fitter = CellFitter(Evidence(records(named, runs=2), NOMINAL), NOMINAL, 0.1)
     refit = fitter.refit()
-    proposed = fitter._ripples(refit).cycles(effect, fitter.scales.cycles(), 4)
+    proposed = fitter._ripples(refit)[0].cycles(effect, fitter.scales.cycles(), 4)
     assert min(abs(np.array(proposed) - truth["cycles_per_turn"])) <= off
     fit = fitter.add(refit, effect, fitter.screening(refit, effect).proposals())
     found = fit.model.effects[f"{effect}.cycles_per_turn"]

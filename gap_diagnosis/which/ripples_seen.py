@@ -1,0 +1,134 @@
+"""Ripples that are seen along the recorded motion, in the torque that the model lacks there.
+
+A ripple that holds a motor at rest, or decides where it stops, moves it far from where the model
+without it goes; what it does cannot be predicted along the model's motion. But an observer that
+holds the model to the recorded motion says which torque the model lacks at each recorded angle:
+size, number and phase of a ripple follow by least squares, and are starting points as they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from fjr_sim_node import effects as fx
+
+from ..model.evidence import Evidence
+from ..model.simulated_rig import Model
+
+_PER_CROSSOVER = 8.0  # averages in a period of the observer's crossover
+_FASTEST = 1.0  # ripples of a higher frequency, over the crossover, the observer does not follow
+_REST = 0.03  # of the rms velocity: below, friction is whatever holds
+_PEAKS = 2
+_NEARLY, _ALIKE = 0.95, 4
+
+
+class SeenRipples:
+    """The torque that a model lacks along the recorded motion of the fitted parts."""
+
+    def __init__(self, evidence: Evidence, parts: Sequence[int], model: Model) -> None:
+        """Hold the model to the recorded motion.
+
+        Args:
+            evidence: the records.
+            parts: indices of the fitted parts; what others show is not looked at.
+            model: the fit beside which a ripple is looked for.
+        """
+        simulator = evidence.simulator
+        rate, records = evidence.records.sample_rate_hz, evidence.records.records
+        self._crossover_hz = simulator.crossover_hz
+        every = max(int(rate / (_PER_CROSSOVER * simulator.crossover_hz)), 1)
+        runs = sorted({evidence.parts[p].record for p in parts})
+        columns: list[np.ndarray] = []
+        for index, missing in zip(runs, simulator.missing_torque(model, runs), strict=True):
+            record = records[index]
+            seen = np.zeros(record.samples, bool)
+            for part in (evidence.parts[p] for p in parts if evidence.parts[p].record == index):
+                begin = evidence.hop * part.windows.start + evidence.hop // 2
+                seen[begin : begin + evidence.hop * (part.windows.stop - part.windows.start)] = True
+            velocity = np.gradient(_averaged(record.position, every)) * rate / every
+            signals = [_averaged(s, every) for s in (record.position, record.torque, missing)]
+            rows = _averaged(seen.astype(float), every) > 0.5
+            columns.append(np.array([*signals, velocity, np.gradient(velocity)])[:, rows])
+        found: np.ndarray = np.concatenate(columns, axis=1)
+        self._angle, self._torque, self._missing = found[0], found[1], found[2]
+        self._velocity, self._acceleration = found[3], found[4]
+
+    def seeds(self, effect: str, tried: np.ndarray) -> list[dict[str, float]]:
+        """Return starting points of a ripple, by full parameter names.
+
+        Args:
+            effect: a ripple that acts as a torque on the motor; of others nothing is seen.
+            tried: numbers of ripples per turn, ascending.
+        """
+        factor = self._factor(effect)
+        fastest = 2.0 * np.pi * self._crossover_hz * _FASTEST
+        speed = float(np.sqrt(np.mean(self._velocity**2)))
+        tried = tried[tried * speed < fastest]
+        if factor is None or tried.size < 3 or not np.isfinite(self._missing).all():
+            return []
+        rows = factor != 0.0
+        if rows.sum() < 4 * _PER_CROSSOVER:
+            return []
+        angle, factor, velocity = self._angle[rows], factor[rows], self._velocity[rows]
+        base = [np.ones(angle.size), velocity, np.sign(velocity), angle, self._acceleration[rows]]
+        basis = np.linalg.qr(np.array(base).T)[0]
+        missing = _beyond(basis, self._missing[rows])
+
+        def fitted(cycles: float) -> tuple[float, np.ndarray]:
+            waves = factor[:, None] * np.array([np.sin(cycles * angle), np.cos(cycles * angle)]).T
+            waves = _beyond(basis, waves)
+            sizes = np.linalg.lstsq(waves, missing, rcond=1e-6)[0]
+            return float(missing @ (waves @ sizes)), sizes
+
+        explained = np.array([fitted(cycles)[0] for cycles in tried])
+        return [_seed(effect, tried[k], fitted(tried[k])[1]) for k in _best(explained)]
+
+    def _factor(self, effect: str) -> np.ndarray | None:
+        """Return what the sine of a ripple is multiplied by to be a torque on the motor."""
+        entry = fx.EFFECTS[effect]
+        if entry.acts_on == "transmission" or not entry.ripple:
+            return None
+        if entry.acts_on == "motor":
+            moving = np.abs(self._velocity) > _REST * np.sqrt(np.mean(self._velocity**2) + 1e-300)
+            return np.where(moving, -np.sign(self._velocity), 0.0)
+        if not entry.full_parameters[0].unit:  # a share of the torque, not a torque
+            return self._torque
+        return np.ones(self._angle.size)
+
+
+def _seed(effect: str, cycles: float, sizes: np.ndarray) -> dict[str, float]:
+    values: Mapping[str, float] = {
+        "size": float(np.hypot(*sizes)),
+        "cycles": float(cycles),
+        "angle": float(np.arctan2(sizes[1], sizes[0])),
+    }
+    entry = fx.EFFECTS[effect]
+    seed: dict[str, float] = {}
+    for name, parameter in zip(entry.names, entry.parameters, strict=True):
+        if parameter.role in values and not parameter.name.startswith("second"):
+            seed[name] = values[parameter.role]
+    return seed
+
+
+def _best(explained: np.ndarray) -> list[int]:
+    """Return the places of the highest peaks, and some of all that explain nearly as much.
+
+    What moves over less than a ripple or two cannot tell one number of ripples from the next.
+    """
+    padded = np.concatenate([[-np.inf], explained, [-np.inf]])
+    peaks = np.flatnonzero((padded[1:-1] >= padded[:-2]) & (padded[1:-1] >= padded[2:]))
+    highest = peaks[np.argsort(-explained[peaks])][:_PEAKS]
+    near = np.flatnonzero(explained >= _NEARLY * explained.max())
+    some = near[np.linspace(0, near.size - 1, min(near.size, _ALIKE)).astype(int)]
+    return sorted({*highest.tolist(), *some.tolist()})
+
+
+def _averaged(signal: np.ndarray, every: int) -> np.ndarray:
+    count = signal.size // every
+    return signal[: count * every].reshape(count, every).mean(axis=1)
+
+
+def _beyond(basis: np.ndarray, values: np.ndarray) -> np.ndarray:
+    return values - basis @ (basis.T @ values)

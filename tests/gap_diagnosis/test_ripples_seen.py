@@ -1,0 +1,65 @@
+"""Ripples along the recorded motion: the torque that the model lacks there shows them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from test_evidence import NOMINAL, records
+
+from gap_diagnosis.model.evidence import Evidence
+from gap_diagnosis.which.cell_fits import CellFitter
+from gap_diagnosis.which.ripples_seen import SeenRipples, _best
+
+CASES = {
+    "cogging": {"amplitude_nm": 6.0, "cycles_per_turn": 45.0, "phase_rad": 0.7},
+    "position_friction": {"amplitude_nm": 4.0, "cycles_per_turn": 45.0, "phase_rad": -1.2},
+    "torque_constant_ripple": {"amplitude": 0.2, "cycles_per_turn": 45.0, "phase_rad": 2.0},
+}
+
+
+def named(effect: str) -> dict[str, float]:
+    return {f"{effect}.{name}": value for name, value in CASES[effect].items()}
+
+
+@pytest.mark.parametrize("known", [True, False])
+@pytest.mark.parametrize("effect", CASES)
+def test_number_size_and_phase_are_seen(effect, known):
+    truth = named(effect)
+    fitter = CellFitter(Evidence(records(truth, known=known), NOMINAL), NOMINAL, 0.1)
+    seen = SeenRipples(fitter.evidence, fitter.fit_parts, fitter.refit().model)
+    seeds = seen.seeds(effect, np.arange(20.0, 70.0))
+    cycles, phase = f"{effect}.cycles_per_turn", f"{effect}.phase_rad"
+    (size,) = set(truth) - {cycles, phase}
+    nearest = min(seeds, key=lambda seed: abs(seed[cycles] - truth[cycles]))
+    assert abs(nearest[cycles] - truth[cycles]) <= 2.0
+    assert nearest[size] == pytest.approx(truth[size], rel=0.4)
+    assert np.cos(nearest[phase] - truth[phase]) > 0.7
+
+
+def test_a_ripple_that_decides_where_the_motor_rests_is_found():
+    """Along the motion of the model without it nothing of it can be predicted."""
+    truth = {
+        "cogging.amplitude_nm": 60.0,
+        "cogging.cycles_per_turn": 60.0,
+        "cogging.phase_rad": 1.0,
+    }
+    fitter = CellFitter(Evidence(records(truth, runs=2), NOMINAL), NOMINAL, 0.1)
+    refit = fitter.refit()
+    assert max(abs(refit.solution.x)) > 0.5  # the refit bends the datasheet to do what it does
+    fit = fitter.add(refit, "cogging", fitter.screening(refit, "cogging").proposals())
+    found = fitter.further(fit).model.effects
+    assert found["cogging.cycles_per_turn"] == pytest.approx(60.0, rel=0.01)
+    assert found["cogging.amplitude_nm"] == pytest.approx(60.0, rel=0.03)
+
+
+def test_nothing_is_seen_of_a_transmission_or_beyond_what_the_observer_follows():
+    evidence = Evidence(records(seconds=5.0), NOMINAL)
+    fitter = CellFitter(evidence, NOMINAL, 0.1)
+    seen = SeenRipples(evidence, fitter.fit_parts, fitter.refit().model)
+    assert seen.seeds("kinematic_error", np.arange(20.0, 70.0)) == []
+    assert seen.seeds("cogging", np.arange(1e6, 1e6 + 50.0)) == []
+
+
+def test_the_highest_peaks_are_taken_and_what_does_as_well():
+    explained = np.array([0.0, 5.0, 1.0, 10.0, 9.8, 9.7, 2.0, 3.0])
+    assert _best(explained) == [1, 3, 4, 5]
