@@ -9,6 +9,7 @@ from typing import Annotated
 import numpy as np
 from scipy import stats
 
+from fjr_interface.bags.audit import LARGEST
 from fjr_interface.bags.reader import BagReader
 from fjr_kit.errors import InputError
 from fjr_kit.result_types import Array, EqualArrays
@@ -158,10 +159,18 @@ def _check_repeats(name: str, first: np.ndarray, period: np.ndarray) -> None:
         )
 
 
+LEAST_POWER = 1.0 / LARGEST**2
+"""Power of a line (squared unit of its signal) that counts as none: its squares underflow."""
+
+
 def _check_excited(name: str, spectra: RealizationSpectra, excited: np.ndarray) -> None:
-    for signal, symbol in ((spectra.reference, "reference"), (spectra.torque, "torque")):
+    for signal, symbol, least in (
+        (spectra.reference, "reference", 1e-14),
+        (spectra.torque, "torque", 1e-14),
+        (spectra.position, "position", 0.0),  # which may fall steeply with the frequency
+    ):
         power = np.abs(signal[excited]) ** 2
-        silent = np.flatnonzero(power <= 1e-14 * power.mean())
+        silent = np.flatnonzero(power <= max(least * power.mean(), LEAST_POWER))
         if silent.size:
             line = int(excited[silent[0]])
             raise InputError(
