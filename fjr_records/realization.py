@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
-from scipy import stats
+import scipy
 
 from fjr_interface.bags.audit import LARGEST
 from fjr_interface.bags.reader import BagReader
@@ -204,7 +204,9 @@ def period_mismatch(sums: PeriodSums, lines: Lines) -> Mismatch:
     torque_scatter = float(sums.scatter_torque[band].sum()) / degrees
     torque_level = float((np.abs(sums.torque[band]) ** 2).sum())
     count = band.stop - band.start
-    beyond = stats.f.isf(FALSE_ALARM, 2 * degrees * count, _OF_MEDIAN * 2 * degrees * high.size)
+    beyond = scipy.stats.f.isf(
+        FALSE_ALARM, 2 * degrees * count, _OF_MEDIAN * 2 * degrees * high.size
+    )
     excess = scatter - beyond * SENSITIVITY_POWER * floor * count
     unexplained = max(excess, _alternating(sums, band), 0.0)
     return Mismatch(
@@ -231,7 +233,7 @@ def _alternating(sums: PeriodSums, band: slice) -> float:
         return 0.0
     carrying = float(scatter.sum() ** 2 / (scatter**2).sum())
     others = max(float((scatter - power).sum()), 0.0) / rest
-    beyond = stats.f.isf(FALSE_ALARM, 2.0 * carrying, 2.0 * carrying * rest)
+    beyond = scipy.stats.f.isf(FALSE_ALARM, 2.0 * carrying, 2.0 * carrying * rest)
     return max(float(power.sum()) - beyond * others, 0.0) / (sums.periods - 1)
 
 
