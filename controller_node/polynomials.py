@@ -1,4 +1,8 @@
-"""Ratios of polynomials in z^-1: sums, products, common denominators, Tustin's rule."""
+"""Ratios of polynomials in z^-1: sums, products, common denominators, Tustin's rule.
+
+`import scipy` loads its parts where they are first used. `scipy.signal` takes as long as all else
+that a node or a simulation imports, and most of them never use it.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +10,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.signal import cont2discrete, deconvolve
+import scipy
 
 Ratio = tuple[np.ndarray, np.ndarray]
 """Numerator and denominator in powers z^0, z^-1, ..."""
@@ -80,7 +84,7 @@ def _divided(dividend: np.ndarray, divisor: np.ndarray) -> np.ndarray | None:
     """Return the quotient of two polynomials; None if one does not divide the other."""
     if divisor.size > dividend.size:
         return None
-    quotient, left = deconvolve(dividend, divisor)
+    quotient, left = scipy.signal.deconvolve(dividend, divisor)
     return quotient if np.abs(left).max() <= _EXACT * np.abs(dividend).max() else None
 
 
@@ -110,7 +114,8 @@ def discrete(
     b, a = np.trim_zeros(b, "f"), np.trim_zeros(a, "f")
     if not a.size or b.size > a.size:
         return b, np.zeros(1)
-    b, a, _ = cont2discrete((b if b.size else np.zeros(1), a), period_s, method="bilinear")
+    b = b if b.size else np.zeros(1)
+    b, a, _ = scipy.signal.cont2discrete((b, a), period_s, method="bilinear")
     return np.atleast_1d(np.squeeze(b)), np.atleast_1d(np.squeeze(a))
 
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.signal import lfilter
+import scipy
 
 from fjr_kit.compiled import inlined
 from fjr_kit.errors import InputError
@@ -140,8 +140,8 @@ class TransferFunction:
             )
         b, forward, a, _ = self.coefficients
         zi = np.zeros(self.states) if state is None else state
-        torque = lfilter(b, a, reference - position, zi=zi)[0]
-        return torque + lfilter(forward, a, reference) if forward.any() else torque
+        torque = scipy.signal.lfilter(b, a, reference - position, zi=zi)[0]
+        return torque + scipy.signal.lfilter(forward, a, reference) if forward.any() else torque
 
     def clamped(self, torque: np.ndarray) -> np.ndarray:
         """Return a torque within the limit."""
@@ -199,7 +199,8 @@ class TransferFunction:
     def free_responses(self, samples: int) -> np.ndarray:
         """Return the torque that follows from each element of the state alone, (samples, n)."""
         nothing, one = np.zeros(samples), np.ones(1)
-        columns = [lfilter(one, self.denominator, nothing, zi=x)[0] for x in np.eye(self.states)]
+        filtered = scipy.signal.lfilter
+        columns = [filtered(one, self.denominator, nothing, zi=x)[0] for x in np.eye(self.states)]
         return np.reshape(columns, (self.states, samples)).T
 
 

@@ -24,7 +24,8 @@ BAD_INPUT, FAILURE, INTERRUPTED = 2, 1, 130
 
 _LONGEST = 200
 """Characters of an unexpected error that its sentence shows."""
-_NO_THREAD = "can't start new thread"
+_WITHOUT_MEMORY = ("can't start new thread", "failed to map segment from shared object")
+"""What the interpreter and the loader of libraries say then, without a type of error of its own."""
 
 
 def reports_errors(kept: str) -> Callable[[Command], Command]:
@@ -92,7 +93,8 @@ def _out_of_memory(error: BaseException) -> str | None:
     cause: BaseException | None = error
     while cause is not None:
         low = isinstance(cause, OSError) and cause.errno == errno.ENOMEM
-        if isinstance(cause, (MemoryError, BrokenExecutor)) or low or _NO_THREAD in str(cause):
+        low = low or any(words in str(cause) for words in _WITHOUT_MEMORY)
+        if low or isinstance(cause, (MemoryError, BrokenExecutor)):
             return (
                 "The memory is not enough, or a process of fjr was killed for it; free some, or "
                 "give fewer --workers, realizations or samples."

@@ -100,6 +100,18 @@ def load_parameter_file(
     return found
 
 
+def refuse_empty(path: str | Path) -> None:
+    """Raise InputError if a parameter file can't be read or holds nothing.
+
+    ROS itself starts a node with an empty one as if nobody had named it.
+    """
+    if _compose(_read(path), str(path)) is None:
+        raise InputError(
+            f"{path}: names no node; write values below a node's name: {_PARAMETERS}, or leave "
+            "the file out."
+        )
+
+
 def _leave_out(
     where: str,
     values: Mapping[str, Any],

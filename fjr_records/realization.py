@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
-from scipy import stats
+import scipy
 
+from fjr_interface.bags.audit import LARGEST
 from fjr_interface.bags.reader import BagReader
 from fjr_kit.errors import InputError
 from fjr_kit.result_types import Array, EqualArrays
@@ -158,10 +159,18 @@ def _check_repeats(name: str, first: np.ndarray, period: np.ndarray) -> None:
         )
 
 
+LEAST_POWER = 1.0 / LARGEST**2
+"""Power of a line (squared unit of its signal) that counts as none: its squares underflow."""
+
+
 def _check_excited(name: str, spectra: RealizationSpectra, excited: np.ndarray) -> None:
-    for signal, symbol in ((spectra.reference, "reference"), (spectra.torque, "torque")):
+    for signal, symbol, least in (
+        (spectra.reference, "reference", 1e-14),
+        (spectra.torque, "torque", 1e-14),
+        (spectra.position, "position", 0.0),  # which may fall steeply with the frequency
+    ):
         power = np.abs(signal[excited]) ** 2
-        silent = np.flatnonzero(power <= 1e-14 * power.mean())
+        silent = np.flatnonzero(power <= max(least * power.mean(), LEAST_POWER))
         if silent.size:
             line = int(excited[silent[0]])
             raise InputError(
@@ -195,7 +204,9 @@ def period_mismatch(sums: PeriodSums, lines: Lines) -> Mismatch:
     torque_scatter = float(sums.scatter_torque[band].sum()) / degrees
     torque_level = float((np.abs(sums.torque[band]) ** 2).sum())
     count = band.stop - band.start
-    beyond = stats.f.isf(FALSE_ALARM, 2 * degrees * count, _OF_MEDIAN * 2 * degrees * high.size)
+    beyond = scipy.stats.f.isf(
+        FALSE_ALARM, 2 * degrees * count, _OF_MEDIAN * 2 * degrees * high.size
+    )
     excess = scatter - beyond * SENSITIVITY_POWER * floor * count
     unexplained = max(excess, _alternating(sums, band), 0.0)
     return Mismatch(
@@ -222,7 +233,7 @@ def _alternating(sums: PeriodSums, band: slice) -> float:
         return 0.0
     carrying = float(scatter.sum() ** 2 / (scatter**2).sum())
     others = max(float((scatter - power).sum()), 0.0) / rest
-    beyond = stats.f.isf(FALSE_ALARM, 2.0 * carrying, 2.0 * carrying * rest)
+    beyond = scipy.stats.f.isf(FALSE_ALARM, 2.0 * carrying, 2.0 * carrying * rest)
     return max(float(power.sum()) - beyond * others, 0.0) / (sums.periods - 1)
 
 

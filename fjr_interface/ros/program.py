@@ -8,9 +8,11 @@ import sys
 import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 from fjr_kit.errors import InputError, needing_ros
 
+from ..parameter_file import refuse_empty
 from ..parameters import Parameter, ParameterGroup
 
 _WIDTH = 100
@@ -60,9 +62,12 @@ class Program:
         return not _HELP.isdisjoint(arguments)
 
     def refuse(self, arguments: Sequence[str]) -> None:
-        """Raise InputError if an argument is not one of ROS: there are no others."""
+        """Raise InputError if an argument is not one of ROS, or names a file that holds nothing."""
         others = _outside_ros(arguments)
         if not others:
+            for word, file in pairwise(arguments):
+                if word == "--params-file":
+                    refuse_empty(file)
             return
         first = others[0]
         if first in _OF_ROS or ":=" in first:

@@ -116,8 +116,13 @@ def as_bags(changes: BagChanges, span_s: float) -> Bags:
 def scattering(changes: BagChanges) -> str:
     """Return which parameters scatter beyond what is uncertain, each by how much; empty if none."""
     seen = [
-        f"{s.parameter} by {100.0 * s.value:.2g} % ({100.0 * s.low:.2g} to {100.0 * s.high:.2g} %)"
+        f"{s.parameter} by {_percent(s.value)} % ({_percent(s.low)} to {_percent(s.high)} %)"
         for s in changes.scatters
         if s.low > SCATTER_SHOWN
     ]
     return ", ".join(seen)
+
+
+def _percent(share: float) -> str:
+    percent = 100.0 * share
+    return f"{percent:.2g}" if percent < 99.5 else f"{percent:.0f}"

@@ -275,6 +275,13 @@ def test_silent_excited_line_is_refused_by_name(signal, name):
         read(tuple(data), grid(2, 2))
 
 
+@pytest.mark.parametrize("scale", [1e-150, 1e-300])
+def test_a_position_whose_squares_underflow_is_refused(scale):
+    r, u, y = signals(4)
+    with pytest.raises(InputError, match="the position is zero on excited harmonic 1 "):
+        read((r, u, scale * y), grid(2, 1))
+
+
 def test_constant_reference_is_refused():
     _, u, y = signals(4)
     with pytest.raises(InputError, match="reference is zero on excited harmonic 1 "):

@@ -97,7 +97,10 @@ def test_unknown_gains_stay_and_are_listed(tmp_path):
     ("text", "says"),
     [
         ("", "controller"),
-        ("kind: fuzzy\n", "fuzzy"),
+        ("kind: fuzzy\n", r"controller\.kind: must be one of pd, pid, .*, not 'fuzzy'\."),
+        ("p: 1\n", r"controller\.kind: must be one of pd, pid, .*, not None\."),
+        ("[1, 2]\n", r"controller\.kind: must be one of pd, pid, .*, not \[1, 2\]\."),
+        ("kind: [pd]\n", r"controller\.kind: must be one of pd, pid, .*, not \['pd'\]\."),
         ("kind: pd\n", r"controller\.p: Field required"),
         ("kind: pd\np: x\n", r"controller\.p"),
         ("kind: pd\np: true\n", r"controller\.p: must be a number, or unknown"),

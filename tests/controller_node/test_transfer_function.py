@@ -1,12 +1,14 @@
 """The controller as a discrete transfer function: its law, its description, its loop, its check."""
 
 import math
+import sys
 from dataclasses import replace
 
 import effect_rig
 import gap_cases
 import numpy as np
 import pytest
+from processes import completed
 from scipy.signal import lfilter
 
 from controller_node import pd_filtered, transfer_function
@@ -161,3 +163,10 @@ def test_a_record_that_begins_in_the_middle_is_still_checked(case):
     described = realization.experiment.model_copy(update={"controller": wrong})
     assert not check_controller(replace(tail, experiment=described)).passed
     assert RecordedExperiment("one", (tail,)).lines > 100
+
+
+def test_what_only_simulates_starts_without_scipy_signal():
+    """It takes as long to load as all else together, in every worker process."""
+    code = "import sys, fjr_bringup.campaign.batch_run; print('scipy.signal' in sys.modules)"
+    done = completed(sys.executable, "-c", code)
+    assert done.stdout == "False\n", done.stderr

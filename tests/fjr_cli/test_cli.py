@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import re
 import subprocess
@@ -179,6 +180,30 @@ def test_bad_input_and_exit_are_no_error_of_ours():
     done = CliRunner().invoke(failing(InputError("rig.yaml: k0 must be a number.")))
     assert (done.exit_code, done.stderr) == (2, "rig.yaml: k0 must be a number.\n")
     assert CliRunner().invoke(failing(typer.Exit(7))).exit_code == 7
+
+
+def wrapped(cause: BaseException) -> RuntimeError:
+    """Return an error of a compiler, say, that says what low memory did to it."""
+    error = RuntimeError("Failed in nopython mode pipeline (step: native lowering)\nTraceback ...")
+    error.__cause__ = cause
+    return error
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        MemoryError(),
+        wrapped(MemoryError("out of pages")),
+        OSError(errno.ENOMEM, "Cannot allocate memory"),
+        wrapped(RuntimeError("can't start new thread")),
+        ImportError("libgfortran.so.5: failed to map segment from shared object"),
+    ],
+)
+def test_low_memory_is_one_sentence_whoever_met_it(error, monkeypatch):
+    monkeypatch.delenv("FJR_DEBUG", raising=False)
+    done = CliRunner().invoke(failing(error))
+    assert done.exit_code == 1 and done.stderr.count("\n") == 1
+    assert done.stderr.startswith("The memory is not enough, or a process of fjr was killed for it")
 
 
 def test_unexpected_error_names_a_log_with_the_traceback(tmp_path, monkeypatch):

@@ -55,6 +55,21 @@ def test_an_argument_that_nobody_reads_is_refused(
     assert sentence in node.output
 
 
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [("", ": names no node; "), ("# k1: 0\n", ": names no node; "), (None, ": cannot be read: ")],
+)
+def test_a_parameter_file_that_holds_nothing_is_refused(
+    start_program: Starter, tmp_path: Path, text: str | None, sentence: str
+) -> None:
+    file = tmp_path / "rig.yaml"
+    if text is not None:
+        file.write_text(text)
+    node = start_program("fjr_sim_node", "--ros-args", "--params-file", str(file))
+    assert node.exit_status() == 2
+    assert node.output.startswith(f"error: {file}{sentence}") and node.output.count("\n") == 1
+
+
 @pytest.mark.parametrize("program", [*PROGRAMS, BRIDGE[:1]], ids=" ".join)
 @pytest.mark.parametrize("word", ["--help", "-h"])
 def test_help_names_purpose_and_parameters_and_starts_nothing(

@@ -20,7 +20,7 @@ from effect_rig import (
     relative_rms,
     simulate,
 )
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from controller_node import pd_filtered
@@ -114,6 +114,7 @@ sizes = st.floats(-1.0, 1.0).map(lambda x: 10.0**x)
     frictionless=st.booleans(),
     start=st.tuples(*(st.floats(-limit, limit) for limit in (0.05, 2.0, 0.05, 2.0))),
 )
+@example(["cubic_stiffness"], 10.0, True, (0.0, 0.0, 0.03125, 0.0))
 def test_no_energy_comes_from_nothing(identifiers, scale, frictionless, start):
     on = {}
     for identifier in identifiers:
@@ -127,13 +128,24 @@ def test_no_energy_comes_from_nothing(identifiers, scale, frictionless, start):
     # Viscous friction that pushes in one direction is no passive effect.
     viscous = plant.with_added({**PAPER, **on, **bare})["fvm"]
     assume(on.get("asymmetric_friction.viscous_nm_s_rad", 0.0) <= viscous)
-    body = Rig(bare, on).start(*start)
+    gained = greatest_gain(Rig(bare, on).start(*start))
+    if gained >= 1e-5:
+        # What the steps err by falls with their size, what a law creates does not.
+        assert gained < 1e-4 and greatest_gain(Rig(bare, on).start(*start), 40) < 0.01 * gained
+
+
+def greatest_gain(body: Rig, parts: int = 1) -> float:
+    """Return by how much energy grows at most in one of 60 samples, relative to what is at play.
+
+    Args:
+        body: the rig, in motion.
+        parts: of a sample; the steps of each are no longer than it.
+    """
     energies = [body.energy()]
     for _ in range(60):
-        body.hold(0.0)
+        body.hold(0.0, parts=parts)
         energies.append(body.energy())
-    at_play = 0.1 + abs(energies[0])
-    assert np.diff(energies).max() < 1e-5 * at_play
+    return float(np.diff(energies).max() / (0.1 + abs(energies[0])))
 
 
 @pytest.mark.parametrize("torque", [0.0, 3.0, -3.0])

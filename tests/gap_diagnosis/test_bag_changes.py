@@ -7,8 +7,8 @@ import pytest
 from gap_cases import simulate_case, vary
 
 from fjr_records.noise import noise_levels
-from gap_diagnosis.gates.bag_changes import TREND_FALSE_ALARM
-from gap_diagnosis.gates.bags_gate import bags_gate, periodic_changes
+from gap_diagnosis.gates.bag_changes import TREND_FALSE_ALARM, BagChanges, Scatter
+from gap_diagnosis.gates.bags_gate import bags_gate, periodic_changes, scattering
 from gap_diagnosis.investigation import investigate
 from gap_diagnosis.model.simulated_rig import Simulator
 from gap_diagnosis.outcome.diagnosis import Diagnosis
@@ -125,6 +125,11 @@ def test_a_diagnosis_of_a_rig_whose_friction_scatters_tells_the_scatter(tmp_path
     for name, did in zip(FRICTION, drawn, strict=True):
         found = diagnosis.bags.scatter_percent[name]
         assert found.low <= 100.0 * did <= found.high
+
+
+def test_percents_are_written_as_people_write_them():
+    found = (Scatter("fs", 0.234, 0.12, 1.504), Scatter("fvm", 0.05, 0.001, 0.9996))
+    assert scattering(BagChanges((), found, 1.0)) == "fs by 23 % (12 to 150 %)"
 
 
 def test_bags_in_which_the_link_never_moves_are_not_compared():
