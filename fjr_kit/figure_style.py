@@ -87,12 +87,16 @@ def frequency_axis(axes: list[Axes], frequency_hz: np.ndarray) -> None:
 
 
 def log_axis(axis: Axes, low: float, high: float) -> None:
-    """Make x logarithmic from `low` to `high`, with plain numbers at the ticks."""
+    """Make x logarithmic from `low` to `high`, with plain numbers at the ticks.
+
+    Two decades or less hold one power of ten or two, so that 2 and 5 have numbers as well.
+    """
+    plain = FuncFormatter(lambda x, _: f"{x:g}")
     axis.set_xscale("log")
     axis.xaxis.set_major_locator(LogLocator(subs=(1.0,)))
-    axis.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
+    axis.xaxis.set_major_formatter(plain)
     axis.xaxis.set_minor_locator(LogLocator(subs=(2.0, 5.0)))
-    axis.xaxis.set_minor_formatter(NullFormatter())
+    axis.xaxis.set_minor_formatter(plain if high <= 100 * low else NullFormatter())
     axis.set_xlim(low, high)
 
 

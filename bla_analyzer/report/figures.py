@@ -121,7 +121,8 @@ def _draw_bla_points(axis: Axes, bla: BlaEstimate, values: np.ndarray) -> None:
 def _draw_uncertainties(axis: Axes, bla: BlaEstimate) -> None:
     """Draw disc radius, noise and nonlinear standard deviation; unknown ones are left out."""
     f = bla.frequency_hz
-    axis.plot(f, decibel(bla.radius_95), "-", color=RADIUS, label="radius of the 95 % disc")
+    if np.isfinite(bla.radius_95).any():
+        axis.plot(f, decibel(bla.radius_95), "-", color=RADIUS, label="radius of the 95 % disc")
     if np.isfinite(bla.var_nonlinear).any():
         keep = significant(bla)
         sigma = decibel(np.sqrt(bla.var_nonlinear[keep]))

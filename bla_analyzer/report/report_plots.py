@@ -130,7 +130,9 @@ def _link_points(bla: BlaEstimate) -> list[Trace]:
 
 def _uncertainties(bla: BlaEstimate) -> list[Trace]:
     f, radius = bla.frequency_hz, "radius of the 95 % disc"
-    traces = [trace(f, decibel(bla.radius_95), radius, "--radius", dash="solid", unit="dB")]
+    traces = []
+    if np.isfinite(bla.radius_95).any():
+        traces.append(trace(f, decibel(bla.radius_95), radius, "--radius", dash="solid", unit="dB"))
     if np.isfinite(bla.var_nonlinear).any():
         keep = significant(bla)
         name = f"{SIGMA} nonlinear (significant at {keep.sum()})"

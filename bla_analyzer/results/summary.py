@@ -188,10 +188,15 @@ def level_name(level: LevelResult) -> str:
     if not level.amplitude_rad.size or not np.isfinite(level.reference_rms_rad):
         return f"Level {level.level}"
     if level.bla is not None and level.bla.method == "local":
-        return f"Level {level.level}, {1e3 * level.reference_rms_rad:.3g} mrad rms"
-    low, high = 1e3 * np.min(level.amplitude_rad), 1e3 * np.max(level.amplitude_rad)
-    span = f"{high:.3g}" if np.isclose(low, high) else f"{low:.3g}-{high:.3g}"
-    return f"Level {level.level}, {span} mrad"
+        return f"Level {level.level}, {_angles(level.reference_rms_rad)} rms"
+    low, high = float(np.min(level.amplitude_rad)), float(np.max(level.amplitude_rad))
+    return f"Level {level.level}, {_angles(*((high,) if np.isclose(low, high) else (low, high)))}"
+
+
+def _angles(*rad: float) -> str:
+    """Return an angle or a span of angles (rad) in mrad, or in rad from 1 rad on."""
+    unit, scale = ("rad", 1.0) if max(rad) >= 1.0 else ("mrad", 1e3)
+    return f"{'-'.join(f'{scale * value:.3g}' for value in rad)} {unit}"
 
 
 def failed_checks(result: Result) -> tuple[Check, ...]:

@@ -393,6 +393,8 @@ def test_summary_numbers(result):
     level = result.levels[1]
     numbers = summarize(level)
     assert numbers.name == level_name(level) == "Level 1, 7 mrad"
+    wide = changed(level, amplitude_rad=np.array([0.02, 1.824]))
+    assert level_name(wide) == "Level 1, 0.02-1.82 rad"
     assert numbers.linear_db == pytest.approx(10 * np.log10(np.mean(level.excited.position**2)))
     assert numbers.odd_db > numbers.even_db + 10
     assert numbers.noise_db == pytest.approx(20 * np.log10(2e-5 / np.sqrt(2)))

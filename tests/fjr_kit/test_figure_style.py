@@ -26,6 +26,16 @@ def test_ticks_of_logarithmic_axes_are_plain_numbers(scaled):
     assert "10" in texts and not any("$" in text for text in texts), texts
 
 
+@pytest.mark.parametrize(("high", "also"), [(249.0, {"20", "50", "200"}), (2490.0, set())])
+def test_two_decades_or_less_have_numbers_between_the_powers_of_ten(high, also):
+    with mpl.rc_context(STYLE):
+        axis = Figure().add_subplot()
+        axis.set_yticks([])
+        log_axis(axis, 13.0, high)
+        shown = set(written(axis))
+    assert shown & {"20", "50", "200"} == also and "100" in shown
+
+
 def test_the_bare_scale_would_show_a_formula():
     with mpl.rc_context(STYLE):
         axis = Figure().add_subplot()
