@@ -136,12 +136,16 @@ class SimulatorNode(runtime.RigNode):
 
     @property
     def run(self) -> str | None:
-        """The realization under way and how far it is, in words; None without one."""
+        """The realization under way and how far it is, in words; None without one.
+
+        A sample that waits for its torque counts, as no pause can hold it back any more.
+        """
         experiment, drive = self._experiment, self._drive or self._lockstep
         if experiment is None or drive is None:
             return None
+        begun = drive.samples + bool(self._lockstep and self._lockstep.stamp)
         return (
-            f"level {experiment.level}, realization {experiment.realization}: {drive.samples} of "
+            f"level {experiment.level}, realization {experiment.realization}: {begun} of "
             f"{drive.total} samples"
         )
 
