@@ -28,7 +28,7 @@ HEADS = (
 )
 _WORDS = ("defined", "QoS")
 _APART = [name for name, _ in HEADS].index("stamps\ntwice")
-"""On a narrow terminal the times of messages stand in one table, what is said of them in another."""
+"""On a narrow terminal a table for the times of messages, and one for the rest."""
 _RECORDED = "*"
 _LEGEND = f"{_RECORDED} by the times of recording: the messages begin with no stamp"
 
