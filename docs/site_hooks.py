@@ -74,7 +74,7 @@ def _row(parameter: Any) -> str:
     elif parameter.metavar:
         names += f" `{parameter.metavar}`"
     default = "" if parameter.default in (None, False, ()) else f" Default: `{parameter.default}`."
-    return f"| {names.replace('|', chr(92) + '|')} | {_plain(parameter.help or '')}{default} |"
+    return f"| {names} | {_plain(parameter.help or '')}{default} |"
 
 
 def _plain(text: str) -> str:

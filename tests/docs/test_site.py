@@ -62,6 +62,7 @@ def test_a_page_opened_from_the_folder_can_search(site: Path):
 
 def test_every_command_and_option_is_in_the_reference(site: Path):
     page = (site / "reference/commands.html").read_text(encoding="utf-8")
+    assert "\\|" not in page
     commands = dict(typer.main.get_command(app).commands)  # type: ignore[attr-defined]
     commands |= {f"blind {n}": c for n, c in commands.pop("blind").commands.items()}
     for name, command in commands.items():
