@@ -126,7 +126,7 @@ class SimulatorNode(runtime.RigNode):
         self.get_logger().info(f"{self.run}.".capitalize())
         self._running = True
         self._controllers = self.writers("controller")
-        self._publish_link = self._link.get_subscription_count() > 0
+        self._look_for_link()
         if self._drive is None:
             self.go_on()
             return
@@ -185,9 +185,13 @@ class SimulatorNode(runtime.RigNode):
         position = drive.measure()
         self._publish_position(drive.stamp, position)
         if drive.samples % _LOOK_SAMPLES == 0:
-            self._publish_link = self._link.get_subscription_count() > 0
+            self._look_for_link()
         if self._publish_link:
             self._link.publish(self._encode(drive.stamp, drive.link))
+
+    def _look_for_link(self) -> None:
+        heard = self._link.get_subscription_count() > 0
+        self._publish_link = heard or self.values["link_encoder"]
 
     def _publish_position(self, stamp: int, position: float) -> None:
         self._position.publish(self._encode(stamp, position))
