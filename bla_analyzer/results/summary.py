@@ -34,12 +34,17 @@ def decibel(amplitude: np.ndarray | float) -> np.ndarray:
 
 
 def phase_deg(g: np.ndarray) -> np.ndarray:
-    """Return the unwrapped phase in degrees, its median within (-180, 180]; NaN stays NaN."""
+    """Return the unwrapped phase in degrees; NaN stays NaN.
+
+    The median of the lowest fifth of the lines lies within (-270, 90]: masses turn a torque by
+    -180 degrees there, so that motor and link begin on one branch, and none at the edge of two.
+    """
     phase = np.full(len(g), np.nan)
     known = np.isfinite(g)
     if known.any():
         unwrapped = np.degrees(np.unwrap(np.angle(g[known])))
-        phase[known] = unwrapped - 360.0 * np.ceil((np.median(unwrapped) - 180.0) / 360.0)
+        low = np.median(unwrapped[: -(-unwrapped.size // 5)])
+        phase[known] = unwrapped - 360.0 * np.ceil((low - 90.0) / 360.0)
     return phase
 
 
