@@ -17,11 +17,18 @@ PACKAGES = (
     "fjr_records",
     "bla_analyzer",
     "gap_diagnosis",
+    "fjr_export",
+    "fjr_compare",
     "fjr_bringup",
     "fjr_sim_node",
     "excitation_node",
     "controller_node",
 )
+DESIGN = {
+    "fjr_bringup.design.planner": ("read_pilots", "propose"),
+    "fjr_bringup.design.planned": ("planned_record",),
+}
+"""Names that notebooks and docs/python.md take from modules of a package."""
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
@@ -67,7 +74,7 @@ def _row(parameter: Any) -> str:
     elif parameter.metavar:
         names += f" `{parameter.metavar}`"
     default = "" if parameter.default in (None, False, ()) else f" Default: `{parameter.default}`."
-    return f"| {names.replace('|', chr(92) + '|')} | {_plain(parameter.help or '')}{default} |"
+    return f"| {names} | {_plain(parameter.help or '')}{default} |"
 
 
 def _plain(text: str) -> str:
@@ -138,10 +145,11 @@ def api_page() -> str:
     from importlib import import_module
 
     lines = ["# Python API", "", "What the packages export; [examples](../python.md).", ""]
-    for package in PACKAGES:
+    exported = {package: import_module(package).__all__ for package in PACKAGES}
+    for package, names in (exported | DESIGN).items():
         module = import_module(package)
         lines += [f"## {package}", ""]
-        for name in module.__all__:
+        for name in names:
             value = getattr(module, name)
             home = getattr(value, "__module__", None)
             target = f"{home}.{name}" if isinstance(home, str) and callable(value) else ""

@@ -15,7 +15,9 @@ from fjr_kit.terminal import print_table
 def print_summary(result: Result, console: Console) -> None:
     """Print the key numbers of each level, and every sentence that a reader must see."""
     console.print(campaign(result), headline(result), highlight=False)
-    print_table(console, *_table(result))
+    heads, rows = _table(result)
+    v = next((i for i, (name, _) in enumerate(heads) if name.startswith("V\n")), 0)
+    print_table(console, heads, rows, apart=v)
     several = len(result.levels) > 1
     for level in result.levels:
         for sentence in findings(level):

@@ -9,6 +9,7 @@ whole group of them, as a dataclass that `option_groups` unfolds.
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable
 from typing import Annotated
 
@@ -70,13 +71,19 @@ def options(
     """Run, rehearse and analyze identification experiments on a flexible-joint rig."""
 
 
-app.command()(analyze)
-app.command()(fit)
-app.command("import")(import_records)
+def _reflowed(command: Command) -> str:
+    """Return the docstring of a command, which the terminal breaks at its own width."""
+    paragraphs = inspect.cleandoc(command.__doc__ or "").split("\n\n")
+    return "\n\n".join(" ".join(paragraph.split()) for paragraph in paragraphs)
+
+
+app.command(help=_reflowed(analyze))(analyze)
+app.command(help=_reflowed(fit))(fit)
+app.command("import", help=_reflowed(import_records))(import_records)
 for command in COMMANDS:
-    app.command()(command)
+    app.command(help=_reflowed(command))(command)
 for command in BY_HAND:
-    app.command(rich_help_panel="A rig started by hand")(command)
+    app.command(help=_reflowed(command), rich_help_panel="A rig started by hand")(command)
 app.add_typer(blind, name="blind")
 
 

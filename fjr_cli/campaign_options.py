@@ -117,8 +117,9 @@ def print_estimate(
 
     found = estimate(campaign, folder)
     typer.echo(
-        f"{campaign.levels} levels, {found.bags} bags of {found.samples} samples; "
-        f"{found.pending} to record, {duration(found.simulated_s)} of simulated time."
+        f"{campaign.levels} level{'s' * (campaign.levels > 1)}, {found.bags} bags of "
+        f"{found.samples} samples; {found.pending} to record, {duration(found.simulated_s)} of "
+        "simulated time."
     )
     if bags:
         typer.echo(f"Disk: {size(found.disk_bytes)}, measured on one period.")

@@ -27,6 +27,8 @@ HEADS = (
     ("QoS", ""),
 )
 _WORDS = ("defined", "QoS")
+_APART = [name for name, _ in HEADS].index("stamps\ntwice")
+"""On a narrow terminal a table for the times of messages, and one for the rest."""
 _RECORDED = "*"
 _LEGEND = f"{_RECORDED} by the times of recording: the messages begin with no stamp"
 
@@ -57,7 +59,7 @@ def audited(bag: Path, wanted: Sequence[str], sources: SignalMap | None, console
         markup=False,
         soft_wrap=True,
     )
-    print_table(console, HEADS, [_row(topic) for topic in topics], left=_WORDS)
+    print_table(console, HEADS, [_row(topic) for topic in topics], left=_WORDS, apart=_APART)
     if any(each.messages > 1 and not each.stamped for each in topics):
         console.print(_LEGEND, highlight=False, markup=False)
     for note in survey.notes:

@@ -17,7 +17,7 @@ def print_fit(fit: Fit, console: Console) -> None:
         console.print(f"\n{level.name}{order}", highlight=False, markup=False)
         rows = [
             [
-                name if one.unit in ("1", "s") else f"{name} ({one.unit})",
+                name if one.unit in ("", "1") else f"{name} ({one.unit})",
                 *(f"{value:.5g}" for value in (one.value, one.low, one.high)),
             ]
             for name, one in quantities(level)

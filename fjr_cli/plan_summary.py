@@ -38,6 +38,7 @@ def print_foresight(found: Foresight, console: Console) -> None:
             _EFFECTS,
             [_effect(one) for one in limited],
             left=("unit", "best at", "not told from"),
+            apart=_EFFECTS.index(("best at", "")),
         )
     reasons = defaultdict(list)
     for one in found.effects:

@@ -43,6 +43,10 @@ def record(
     count: Annotated[
         int, typer.Option(min=1, help="Number of realizations of the rig, one bag each.")
     ] = 1,
+    link: Annotated[
+        bool,
+        typer.Option("--link", help="The rig has a second encoder: record link_position, too."),
+    ] = False,
     namespace: Namespace = RIG,
 ) -> None:
     """Record a rig that was started by hand, or chosen topics of any rig, and audit the bags.
@@ -58,6 +62,8 @@ def record(
         raise InputError("--duration is for topics; a realization ends by itself.")
     if chosen and count != 1:
         raise InputError("--count is for realizations of the rig, not for topics.")
+    if chosen and link:
+        raise InputError("--link is for realizations of the rig; name link_position as a --topic.")
     for topic in topics or ():
         if not topic.startswith("/"):
             raise InputError(f"--topic {topic}: write the whole name, such as /{topic}.")
@@ -67,6 +73,7 @@ def record(
     from rich.console import Console
 
     from fjr_bringup.campaign.progress import CampaignProgress
+    from fjr_interface.topics import LINK_POSITION, SIGNALS
     from fjr_kit.folder_lock import locked_folder
     from fjr_kit.progress import ProgressLine
 
@@ -84,7 +91,8 @@ def record(
         audit(out)
     else:
         with locked_folder(out), CampaignProgress(done="recorded") as progress:
-            record_by_hand(out, count, progress, audit, namespace)
+            signals = (*SIGNALS, LINK_POSITION) if link else SIGNALS
+            record_by_hand(out, count, progress, audit, namespace, signals)
     typer.echo(out)
     if not all(well):
         raise typer.Exit(FOUND)

@@ -93,8 +93,8 @@ def _notes(first: Result, other: Result, levels: int, grids_differ: bool) -> lis
         )
     if grids_differ:
         notes.append(
-            "The excited lines differ: those that are shared are shown, but not judged, since the "
-            "BLA and the distortion of a nonlinear rig depend on which lines are excited."
+            "The excited lines differ: those that are shared are shown, but not judged, since BLA, "
+            "distortion and noise of a nonlinear rig depend on which lines are excited."
         )
     return notes
 
@@ -164,9 +164,8 @@ def _powers(one: LevelResult, two: LevelResult, one_grid: bool) -> list[PowerDif
         known = (pair[0] > _ROUNDING_RAD**2) & (pair[1] > _ROUNDING_RAD**2)
         if known.any():
             degrees = _degrees(one, kind), _degrees(two, kind)
-            judged = one_grid or kind == "noise"
             powers = pair[0][known], pair[1][known]
-            found.append(_power_difference(kind, *powers, degrees, judged))
+            found.append(_power_difference(kind, *powers, degrees, one_grid))
     return found
 
 

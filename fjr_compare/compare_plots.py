@@ -63,7 +63,7 @@ def _bla(bla: BlaDifference, first: str, other: str) -> Plot:
             y = decibel(difference[keep])
             traces.append(trace(f[keep], y, name, color, symbol=symbol, **mark))
     titles = ["magnitude (dB re 1 rad/(N m))", "phase (degrees)", "|difference| (dB)"]
-    return linked(traces, titles, [1.6, 1.0, 1.3], f)
+    return linked(traces, titles, [2.0, 1.0, 1.2], f)
 
 
 def _parameters(parameters: list[ParameterDifference]) -> Plot:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib import rcParams
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -82,17 +83,23 @@ def frequency_axis(axes: list[Axes], frequency_hz: np.ndarray) -> None:
     if low > 0 and high > 10 * low:
         log_axis(axes[-1], low / 1.1, high * 1.1)
     for axis in axes[:-1]:
-        axis.tick_params(labelbottom=False)
+        axis.tick_params(labelbottom=False, which="both")
     axes[-1].set_xlabel("frequency (Hz)")
 
 
 def log_axis(axis: Axes, low: float, high: float) -> None:
-    """Make x logarithmic from `low` to `high`, with plain numbers at the ticks."""
+    """Make x logarithmic from `low` to `high`, with plain numbers at the ticks.
+
+    Two decades or less hold one power of ten or two, so that 2 and 5 have numbers as well.
+    """
+    plain = FuncFormatter(lambda x, _: f"{x:g}")
     axis.set_xscale("log")
     axis.xaxis.set_major_locator(LogLocator(subs=(1.0,)))
-    axis.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
+    axis.xaxis.set_major_formatter(plain)
     axis.xaxis.set_minor_locator(LogLocator(subs=(2.0, 5.0)))
-    axis.xaxis.set_minor_formatter(NullFormatter())
+    axis.xaxis.set_minor_formatter(plain if high <= 100 * low else NullFormatter())
+    longer = rcParams["xtick.major.size"] - rcParams["xtick.minor.size"]
+    axis.tick_params(axis="x", which="minor", pad=rcParams["xtick.major.pad"] + longer)
     axis.set_xlim(low, high)
 
 

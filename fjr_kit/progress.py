@@ -5,9 +5,18 @@ from __future__ import annotations
 from typing import Any, TypeVar
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import (
+    BarColumn,
+    Progress,
+    ProgressColumn,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 
 _Line = TypeVar("_Line", bound="ProgressLine")
+_WIDE = 100
+"""Columns of a terminal that hold bar and elapsed time beside the words."""
 
 
 class ProgressLine:
@@ -27,12 +36,16 @@ class ProgressLine:
             transient: whether the line goes away at the end.
         """
         self._console = console or Console(stderr=True)
-        self._bar = Progress(
-            BarColumn(),
+        columns: list[ProgressColumn] = [
             TextColumn("{task.fields[amount]}"),
-            TimeElapsedColumn(),
             TimeRemainingColumn(),
             TextColumn("{task.description}", markup=False),
+        ]
+        if self._console.width >= _WIDE:
+            columns.insert(0, BarColumn())
+            columns.insert(2, TimeElapsedColumn())
+        self._bar = Progress(
+            *columns,
             console=self._console,
             transient=transient,
             disable=not self._console.is_terminal,
@@ -63,7 +76,8 @@ class ProgressLine:
 
     def say(self, sentence: str) -> None:
         """Print a sentence above the line; one that is long stays one line in a log."""
-        self._console.print(sentence, highlight=False, markup=False, soft_wrap=True)
+        in_log = not self._console.is_terminal
+        self._console.print(sentence, highlight=False, markup=False, soft_wrap=in_log)
 
     def log(self, sentence: str) -> None:
         """Print a sentence where there is no terminal that shows the line."""

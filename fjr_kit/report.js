@@ -65,7 +65,7 @@
     if (log) {
       const [low, high] = shown ?? bandOf(plot);
       Object.assign(change, {type: "log", tickformat: "~g"});
-      if (high > 3 * low) change.dtick = high > 20 * low ? 1 : "D2";
+      if (high > 3 * low) change.dtick = high > 100 * low ? 1 : "D2";
     }
     if (shown) change.range = scaled(shown).map((v) => (log ? Math.log10(v) : v));
     return {...axis, ...change};

@@ -126,7 +126,7 @@ class SimulatorNode(runtime.RigNode):
         self.get_logger().info(f"{self.run}.".capitalize())
         self._running = True
         self._controllers = self.writers("controller")
-        self._publish_link = self._link.get_subscription_count() > 0
+        self._look_for_link()
         if self._drive is None:
             self.go_on()
             return
@@ -136,12 +136,16 @@ class SimulatorNode(runtime.RigNode):
 
     @property
     def run(self) -> str | None:
-        """The realization under way and how far it is, in words; None without one."""
+        """The realization under way and how far it is, in words; None without one.
+
+        A sample that waits for its torque counts, as no pause can hold it back any more.
+        """
         experiment, drive = self._experiment, self._drive or self._lockstep
         if experiment is None or drive is None:
             return None
+        begun = drive.samples + bool(self._lockstep and self._lockstep.stamp)
         return (
-            f"level {experiment.level}, realization {experiment.realization}: {drive.samples} of "
+            f"level {experiment.level}, realization {experiment.realization}: {begun} of "
             f"{drive.total} samples"
         )
 
@@ -181,9 +185,13 @@ class SimulatorNode(runtime.RigNode):
         position = drive.measure()
         self._publish_position(drive.stamp, position)
         if drive.samples % _LOOK_SAMPLES == 0:
-            self._publish_link = self._link.get_subscription_count() > 0
+            self._look_for_link()
         if self._publish_link:
             self._link.publish(self._encode(drive.stamp, drive.link))
+
+    def _look_for_link(self) -> None:
+        heard = self._link.get_subscription_count() > 0
+        self._publish_link = heard or self.values["link_encoder"]
 
     def _publish_position(self, stamp: int, position: float) -> None:
         self._position.publish(self._encode(stamp, position))

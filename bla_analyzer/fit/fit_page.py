@@ -59,7 +59,7 @@ def _orders(level: LevelFit) -> list[Row]:
             f"{test.name} (chosen)" if test == level.test else test.name,
             *(float(test.parameters), test.cost, test.expected, test.low, test.high),
             *(test.aic, test.mdl),
-            Mark.of(test.passed, ("explains it", "does not")),
+            Mark.of(test.passed, ("yes", "no")),
         )
         for test in level.orders
     ]

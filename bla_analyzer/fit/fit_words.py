@@ -9,6 +9,7 @@ import numpy as np
 from scipy.stats import binom
 
 from .fit_types import Fit, Interval, LevelFit, OutputFit, Root
+from .physical import MEANINGS
 
 SIGNIFICANCE = 0.05
 SHARED = (
@@ -129,9 +130,9 @@ def headline(fit: Fit) -> str:
 
 def quantities(level: LevelFit) -> list[tuple[str, Interval]]:
     """Return what a reader wants first, by name: parameters, delay, modes, gains."""
-    found = list(level.parameters.items())
+    found = [(f"{name}, {MEANINGS[name]}", one) for name, one in level.parameters.items()]
     if level.delay_s.std > 0:
-        found.append(("delay_s", level.delay_s))
+        found.append(("delay", level.delay_s))
     for number, pole in enumerate(pairs(level.poles), start=1):
         found.append((f"resonance {number}", pole.frequency_hz))
         found.append((f"resonance {number}: damping", pole.damping_ratio))

@@ -31,6 +31,17 @@ UNITS = {
     "delay_s": "s",
 }
 """Every parameter by the simulator's name, with its unit."""
+MEANINGS = {
+    "jm": "motor inertia",
+    "j": "link inertia",
+    "k0": "stiffness",
+    "fvm": "motor damping",
+    "fv": "link damping",
+    "extra_mode.inertia_kg_m2": "third mass",
+    "extra_mode.frequency_hz": "its frequency",
+    "extra_mode.damping_ratio": "its damping ratio",
+}
+"""What a reader takes the parameters for, the delay left out."""
 NAMES: dict[Physical, tuple[str, ...]] = {
     "rigid": ("jm", "fvm"),
     "two-inertia": ("jm", "j", "k0", "fvm", "fv"),

@@ -83,9 +83,10 @@ def draw_bla(level: LevelResult, bla: BlaEstimate) -> Figure:
     turn = bla_phase_deg(level, bla)
     reach = phase_reach_deg(bla.g, bla.radius_95)
     band: Style = {"color": EXCITED, "alpha": BAND, "lw": 0, "zorder": 1.5}
-    ends = magnitude_band_db(bla.g, bla.radius_95)
-    magnitude.fill_between(f, *ends, label="95 % band", **band)
-    phase.fill_between(f, turn - reach, turn + reach, **band)
+    if np.isfinite(bla.radius_95).any():
+        ends = magnitude_band_db(bla.g, bla.radius_95)
+        magnitude.fill_between(f, *ends, label="95 % band", **band)
+        phase.fill_between(f, turn - reach, turn + reach, **band)
     _draw_bla_points(magnitude, bla, decibel(bla.g))
     _draw_bla_points(phase, bla, turn)
     for comparison, (colour, dash) in zip(level.comparisons, model_styles(), strict=False):
@@ -98,7 +99,8 @@ def draw_bla(level: LevelResult, bla: BlaEstimate) -> Figure:
         link: Style = {"color": EVEN, "marker": "s", "ls": "", "ms": 2}
         magnitude.plot(f, decibel(bla.link.g), label="BLA,\nlink position", **link)
         radius: Style = {"color": RADIUS, "ls": ":", "label": "95 % disc,\nlink position"}
-        magnitude.plot(f, decibel(bla.link.radius_95), **radius)
+        if np.isfinite(bla.link.radius_95).any():
+            magnitude.plot(f, decibel(bla.link.radius_95), **radius)
         phase.plot(f, phase_deg(bla.link.g), **link)
     magnitude.set_ylabel("magnitude (dB re 1 rad/(N m))")
     phase.set_ylabel("phase (degrees)")
@@ -121,7 +123,8 @@ def _draw_bla_points(axis: Axes, bla: BlaEstimate, values: np.ndarray) -> None:
 def _draw_uncertainties(axis: Axes, bla: BlaEstimate) -> None:
     """Draw disc radius, noise and nonlinear standard deviation; unknown ones are left out."""
     f = bla.frequency_hz
-    axis.plot(f, decibel(bla.radius_95), "-", color=RADIUS, label="radius of the 95 % disc")
+    if np.isfinite(bla.radius_95).any():
+        axis.plot(f, decibel(bla.radius_95), "-", color=RADIUS, label="radius of the 95 % disc")
     if np.isfinite(bla.var_nonlinear).any():
         keep = significant(bla)
         sigma = decibel(np.sqrt(bla.var_nonlinear[keep]))

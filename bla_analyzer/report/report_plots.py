@@ -104,6 +104,8 @@ def _bands(level: LevelResult, bla: BlaEstimate) -> list[Trace]:
     """Return the bands that the discs of each output span, in magnitude and phase."""
     f, traces = bla.frequency_hz, []
     for one, phase, what, color in outputs(level, bla):
+        if not np.isfinite(one.radius_95).any():
+            continue
         name = f"95 % band{what}"
         traces.append(area(f, *magnitude_band_db(one.g, one.radius_95), name, color))
         reach = phase_reach_deg(one.g, one.radius_95)
@@ -119,8 +121,9 @@ def _link_points(bla: BlaEstimate) -> list[Trace]:
     f, link, name = bla.frequency_hz, bla.link, "BLA, link position"
     mark: Options = {"symbol": "square", "size": 4}
     dashed: Options = {"dash": "dot", "unit": "dB"}
+    disc = trace(f, decibel(link.radius_95), "95 % disc, link position", "--radius", **dashed)
     return [
-        trace(f, decibel(link.radius_95), "95 % disc, link position", "--radius", **dashed),
+        *([disc] if np.isfinite(link.radius_95).any() else []),
         trace(f, decibel(link.g), name, "--even", **mark, unit="dB"),
         trace(
             f, phase_deg(link.g), name, "--even", **mark, row=2, showlegend=False, unit="degrees"
@@ -130,7 +133,9 @@ def _link_points(bla: BlaEstimate) -> list[Trace]:
 
 def _uncertainties(bla: BlaEstimate) -> list[Trace]:
     f, radius = bla.frequency_hz, "radius of the 95 % disc"
-    traces = [trace(f, decibel(bla.radius_95), radius, "--radius", dash="solid", unit="dB")]
+    traces = []
+    if np.isfinite(bla.radius_95).any():
+        traces.append(trace(f, decibel(bla.radius_95), radius, "--radius", dash="solid", unit="dB"))
     if np.isfinite(bla.var_nonlinear).any():
         keep = significant(bla)
         name = f"{SIGMA} nonlinear (significant at {keep.sum()})"

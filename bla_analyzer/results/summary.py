@@ -34,12 +34,17 @@ def decibel(amplitude: np.ndarray | float) -> np.ndarray:
 
 
 def phase_deg(g: np.ndarray) -> np.ndarray:
-    """Return the unwrapped phase in degrees, its median within (-180, 180]; NaN stays NaN."""
+    """Return the unwrapped phase in degrees; NaN stays NaN.
+
+    The median of the lowest fifth of the lines lies within (-270, 90]: masses turn a torque by
+    -180 degrees there, so that motor and link begin on one branch, and none at the edge of two.
+    """
     phase = np.full(len(g), np.nan)
     known = np.isfinite(g)
     if known.any():
         unwrapped = np.degrees(np.unwrap(np.angle(g[known])))
-        phase[known] = unwrapped - 360.0 * np.ceil((np.median(unwrapped) - 180.0) / 360.0)
+        low = np.median(unwrapped[: -(-unwrapped.size // 5)])
+        phase[known] = unwrapped - 360.0 * np.ceil((low - 90.0) / 360.0)
     return phase
 
 
@@ -188,10 +193,15 @@ def level_name(level: LevelResult) -> str:
     if not level.amplitude_rad.size or not np.isfinite(level.reference_rms_rad):
         return f"Level {level.level}"
     if level.bla is not None and level.bla.method == "local":
-        return f"Level {level.level}, {1e3 * level.reference_rms_rad:.3g} mrad rms"
-    low, high = 1e3 * np.min(level.amplitude_rad), 1e3 * np.max(level.amplitude_rad)
-    span = f"{high:.3g}" if np.isclose(low, high) else f"{low:.3g}-{high:.3g}"
-    return f"Level {level.level}, {span} mrad"
+        return f"Level {level.level}, {_angles(level.reference_rms_rad)} rms"
+    low, high = float(np.min(level.amplitude_rad)), float(np.max(level.amplitude_rad))
+    return f"Level {level.level}, {_angles(*((high,) if np.isclose(low, high) else (low, high)))}"
+
+
+def _angles(*rad: float) -> str:
+    """Return an angle or a span of angles (rad) in mrad, or in rad from 1 rad on."""
+    unit, scale = ("rad", 1.0) if max(rad) >= 1.0 else ("mrad", 1e3)
+    return f"{'-'.join(f'{scale * value:.3g}' for value in rad)} {unit}"
 
 
 def failed_checks(result: Result) -> tuple[Check, ...]:

@@ -15,7 +15,12 @@ from fjr_interface.bags.writer import BagWriter
 from fjr_interface.parameter_file import save_parameter_file
 from fjr_kit.atomic import new_folder
 from fjr_kit.worker_pool import worker_count, worker_pool
-from fjr_sim_node.simulation.simulator import SIMULATOR, Run, run_realization
+from fjr_sim_node.simulation.simulator import (
+    SIMULATOR,
+    Run,
+    recorded_signals,
+    run_realization,
+)
 
 from .plan import Campaign
 from .progress import CampaignProgress
@@ -112,8 +117,9 @@ def _write(
 ) -> tuple[Path, float]:
     trajectory = run_realization(values, run, reference)
     bag = bag_folder(folder, run.level, run.realization)
-    with BagWriter(bag, run) as writer:
-        writer.write_arrays(r=trajectory.reference, y=trajectory.position, u=trajectory.torque)
+    signals = recorded_signals(values)
+    with BagWriter(bag, run, signals=signals) as writer:
+        writer.write_arrays(**trajectory.recorded(signals))
     return bag, trajectory.reference.size / run.sample_rate_hz
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fjr_interface.bags.writer import BagWriter
-from fjr_sim_node.simulation.simulator import run_realization
+from fjr_sim_node.simulation.simulator import recorded_signals, run_realization
 
 from .plan import Campaign
 
@@ -48,12 +48,14 @@ def estimate(campaign: Campaign, folder: Path | None = None) -> Estimate:
     """
     whole = campaign.experiment(campaign.levels - 1, 0)
     piece = whole.model_copy(update={"periods": 1, "transient_periods": 0})
-    run_realization(campaign.values["simulator"], piece)  # compiles
+    values = campaign.values["simulator"]
+    signals = recorded_signals(values)
+    run_realization(values, piece)  # compiles
     with tempfile.TemporaryDirectory(prefix="fjr-estimate-") as scratch:
         begun = time.perf_counter()
-        motion = run_realization(campaign.values["simulator"], piece)
-        with BagWriter(Path(scratch) / "bag", piece) as bag:
-            bag.write_arrays(r=motion.reference, y=motion.position, u=motion.torque)
+        motion = run_realization(values, piece)
+        with BagWriter(Path(scratch) / "bag", piece, signals=signals) as bag:
+            bag.write_arrays(**motion.recorded(signals))
         seconds = time.perf_counter() - begun
         size = sum(file.stat().st_size for file in bag.folder.iterdir())
     there = campaign.recorded(folder) if folder is not None else 0

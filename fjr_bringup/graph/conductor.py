@@ -17,7 +17,7 @@ from std_srvs.srv import Trigger
 
 from fjr_interface.bags.folder_names import bag_folder
 from fjr_interface.experiment import Experiment
-from fjr_interface.topics import NAMESPACE, NODES, SIGNALS, Signal
+from fjr_interface.topics import NAMESPACE, NODES, Signal
 from fjr_kit.errors import InputError
 from fjr_kit.processes import ProcessGroup
 from fjr_kit.stopping import Interruption
@@ -107,7 +107,7 @@ class Conductor:
         return bool(future and future.done())
 
     def _refuse_others(self) -> None:
-        for signal in SIGNALS:
+        for signal in self._recorder.signals:
             writers = self._node.get_publishers_info_by_topic(signal.topic)
             if len(writers) > 1:
                 names = ", ".join(f"{each.node_namespace}/{each.node_name}" for each in writers)
@@ -243,7 +243,7 @@ class Conductor:
 
     def _who_owes(self) -> str:
         """Return the node that owes the next message, by the newest stamp of each signal."""
-        reference, position, torque = self._recorder.newest_ns
+        reference, position, torque = self._recorder.newest_ns[:3]
         if not self._recorder.described:  # it follows the controller's answer to the reference
             return "controller" if reference else "excitation"
         if reference < position:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -10,12 +11,14 @@ from fjr_interface.parameter_file import save_parameter_file
 from fjr_interface.topics import NAMESPACE, NODES
 from fjr_kit.processes import ProcessGroup
 from fjr_kit.stopping import Interruption
+from fjr_sim_node.simulation.simulator import recorded_signals
 
 from ..campaign.live import LiveBla
 from ..campaign.plan import CAMPAIGN_FILE, Campaign
 from ..campaign.progress import CampaignProgress
 from .conductor import Conductor
 from .domain import claimed_domain, reach
+from .recorder import Recorder
 
 ROLES: dict[str, dict[str, Any]] = {
     "simulator": {"readers": "controller,recorder"},
@@ -66,7 +69,8 @@ def run_campaign(
             processes.start(name, "fjr_bringup.graph.composed", ros_arguments(files), log)
         else:
             start_nodes(processes, NODES, files, logs)
-        with Conductor(processes, interruption) as conductor:
+        recorder = partial(Recorder, signals=recorded_signals(campaign.values["simulator"]))
+        with Conductor(processes, interruption, recorder=recorder) as conductor:
             conductor.wait_for_graph()
             bags = []
             for level, realization in pending:

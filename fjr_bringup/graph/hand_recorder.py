@@ -15,7 +15,7 @@ from std_srvs.srv import Trigger
 from fjr_interface.bags.folder_names import bag_folder
 from fjr_interface.bags.writer import BagWriter, keep_whole_periods
 from fjr_interface.experiment import Experiment
-from fjr_interface.topics import NAMESPACE, checked_namespace, stamp_ns
+from fjr_interface.topics import NAMESPACE, SIGNALS, Signal, checked_namespace, stamp_ns
 from fjr_kit.errors import InputError
 from fjr_kit.stopping import Interruption
 
@@ -115,6 +115,7 @@ def record_by_hand(
     progress: CampaignProgress,
     recorded: Callable[[Path], None],
     namespace: str = NAMESPACE,
+    signals: tuple[Signal, ...] = SIGNALS,
 ) -> None:
     """Record realizations of the rig in the ROS domain of the environment.
 
@@ -124,6 +125,7 @@ def record_by_hand(
         progress: where progress is shown.
         recorded: called with every bag when it lies, audited, in its place.
         namespace: where the rig is.
+        signals: what is recorded of each sample.
 
     Raises:
         InputError: no namespace, the environment names no domain, a sample was lost, the
@@ -134,7 +136,7 @@ def record_by_hand(
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     try:
         node = rclpy.create_node("recorder", namespace=namespace)
-        recorder = HandRecorder(node)
+        recorder = HandRecorder(node, signals)
         progress.say(f"Recording in ROS domain {domain}; {reach()}.")
         with Interruption() as interruption:
             try:

@@ -8,6 +8,7 @@ an observer.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +16,7 @@ import numpy as np
 from controller_node import pd_filtered, transfer_function
 from controller_node.law import Law
 from controller_node.transfer_function import TransferFunction
+from fjr_interface.topics import Signal
 from fjr_kit.compiled import jit
 from fjr_kit.errors import InputError
 
@@ -40,6 +42,12 @@ class Trajectory:
     torque: np.ndarray
     link: np.ndarray
     motor: np.ndarray
+
+    def recorded(self, signals: Sequence[Signal]) -> dict[str, np.ndarray]:
+        """Return the samples of signals by their symbols, as a bag takes them."""
+        r, y, u, q = self.reference, self.position, self.torque, self.link
+        every = {"r": r, "y": y, "u": u, "q": q}
+        return {signal.symbol: every[signal.symbol] for signal in signals}
 
 
 @jit

@@ -13,6 +13,7 @@ from controller_node.law import law_of
 from excitation_node import multisine, record_experiment
 from fjr_interface.experiment import Experiment, RecordDescription
 from fjr_interface.parameters import Parameter, ParameterGroup
+from fjr_interface.topics import LINK_POSITION, SIGNALS, Signal
 from fjr_kit.errors import InputError
 
 from .. import effects, plant
@@ -32,8 +33,19 @@ SIMULATOR = ParameterGroup(
         -40.0,
     ),
     Parameter("noise_seed", 1, "", "Seed of the encoder noise", 0, 2**31 - 1),
+    Parameter(
+        "link_encoder",
+        False,
+        "",
+        "The rig has a second encoder, free of noise: the link's position is recorded as well",
+    ),
 )
 """Parameters of the simulated rig and of all effects, by the names of the node's parameters."""
+
+
+def recorded_signals(values: Mapping[str, Any]) -> tuple[Signal, ...]:
+    """Return the signals of each sample of a rig's bags, by its checked SIMULATOR values."""
+    return (*SIGNALS, LINK_POSITION) if values["link_encoder"] else SIGNALS
 
 
 Run = Experiment | RecordDescription

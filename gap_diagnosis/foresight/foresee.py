@@ -8,6 +8,7 @@ from fjr_records.periodic import RecordedExperiment
 from fjr_records.records import RecordSet
 from fjr_sim_node import effects as fx
 
+from ..gates.gate_checks import check_gates
 from ..model.nominal import refuse_too_stiff
 from ..model.simulated_rig import Model
 from ..which.catalogue import catalogue
@@ -26,6 +27,7 @@ NOISE_UNKNOWN = (
     "The noise is not known, so limits count only what the simulation itself may be off by, 0.1 %; "
     "give the encoder's noise (--set simulator.noise_std_rad=...), or record two periods or more."
 )
+GATE_FAILS = "A gate of the diagnosis would fail, so that these limits would not hold: {}"
 BESIDE_A_REMAINDER = (
     "Records: limits hold for a rig that the nominal describes but for the effect; beside a "
     "remainder more is needed."
@@ -78,6 +80,9 @@ def foresee(
         one.model_copy(update={"not_told_from": limits.not_told_from(one.effect)}) for one in found
     ]
     notes = [] if sight.noise_known else [NOISE_UNKNOWN]
+    if isinstance(recorded, RecordedExperiment):
+        failures = check_gates(recorded, bare).failures
+        notes = [GATE_FAILS.format(gate.sentence) for gate in failures] + notes
     return Foresight(
         source=recorded.source,
         kind=kind,

@@ -121,7 +121,7 @@ def _label_map(axis: Axes, found: ResidualMap, kind: str, first: bool) -> None:
     else:
         lines = found.frequency_hz[1:]
         log_axis(axis, lines[0] / 1.1, lines[-1] * 1.1)
-        axis.tick_params(labelbottom=kind == "even")
+        axis.tick_params(labelbottom=kind == "even", which="both")
     if kind == "even":
         axis.set_xlabel("frequency (Hz)", labelpad=1)
     if first:

@@ -50,9 +50,10 @@ def where_plot(maps: Mapping[str, ResidualMap], signal: Signal) -> Plot:
         [STAGES[name] for name in shown], [1.0] * len(shown), first.frequency_hz[1:]
     )
     traces = []
-    for number, found in enumerate(shown.values(), start=1):
+    for number, (name, found) in enumerate(shown.items(), start=1):
         traces.append(_map_trace(found, signal, rows, number, len(shown)))
         axes[f"yaxis{number if number > 1 else ''}"] |= {
+            "title": {"text": STAGES[name], "standoff": 12},
             "tickvals": list(range(len(rows))),
             "ticktext": [f"{kind} {found.amplitudes_rad[row]:.2g}" for row, kind in rows],
             "range": [-0.6, len(rows) - 0.4],

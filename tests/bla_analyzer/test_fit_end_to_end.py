@@ -189,7 +189,7 @@ def test_the_command_prints_intervals_and_the_page_last(run, linear, tmp_path):
     done = run("fit", analysis, "--model", "two-inertia", "--no-report")
     assert done.exit_code == 0, done.output
     assert done.stdout.splitlines()[-1] == str(analysis / "fit" / "fit.json")
-    assert "k0" in done.stdout and "explains the BLA" in done.stdout
+    assert "k0, stiffness (N m/rad)" in done.stdout and "explains the BLA" in done.stdout
     made = json.loads((analysis / "fit" / "fit.json").read_text())
     assert made["schema"] == "fjr_rig/fit/1"
     for arguments, words in (

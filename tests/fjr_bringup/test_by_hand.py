@@ -43,8 +43,10 @@ def test_pause_step_speed_reset_stop_and_play_by_the_command(start, rig):
     for letter in "sce":
         nodes[letter]()
     rig.peer.spin_until(lambda: len(rig.torque) > 300, "torques")
-    assert ask("pause").message.startswith("paused: level 0, realization 0: ")
+    paused = ask("pause").message
+    assert paused.startswith("paused: level 0, realization 0: ")
     first = int(fjr(start, "step", "3").split()[5])
+    assert first == int(paused.split()[5]) + 3
     for played in (first, first + 3):
         rig.peer.spin_until(lambda: stamps(rig.torque)[-1] == played, "the last step")  # noqa: B023
         status = f"paused: level 0, realization 0: {played} of 21000 samples; as fast as possible"

@@ -8,14 +8,17 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from processes import Starter, completed
 
-from fjr_bringup.campaign.plan import Campaign
+from bla_analyzer import Fit
+from fjr_bringup.campaign.plan import CAMPAIGN_FILE, Campaign
 from fjr_bringup.campaign.settings import parse_settings
 from fjr_cli.demo import DEMO
 from fjr_interface.bags.folder_names import bag_folder
-from fjr_interface.bags.reader import BagReader, audit
+from fjr_interface.bags.reader import BagReader, audit, read_record
+from fjr_sim_node.simulation.simulator import run_realization
 
 INTERRUPTED = (130, -signal.SIGINT)
 """A shell shows 130 for both: `python -m` ends by the signal itself if it came within an exec()."""
@@ -196,6 +199,24 @@ def test_no_worker_survives_a_killed_simulation(tmp_path, start_program):
     run.wait_for(lambda: list((tmp_path / "x").glob("level_*")), "a bag")
     run.process.kill()
     run.process.wait()  # the fixture `mark` waits for the end of all workers
+
+
+def test_a_second_encoder_is_recorded_and_both_are_analyzed_and_fitted(run, tmp_path):
+    out = tmp_path / "two"
+    two = ("--set", "simulator.link_encoder=true", "--set", "simulator.noise_std_rad=1e-5")
+    done = run("simulate", "--out", out, *SHORT, "--realizations", "4", "--workers", "1", *two)
+    assert done.exit_code == 0, done.output
+    bag = BagReader(bag_folder(out, 0, 3))
+    expected = run_realization(
+        Campaign.create(out / CAMPAIGN_FILE).values["simulator"], bag.experiment
+    )
+    np.testing.assert_array_equal(read_record(bag.path).link, expected.link)
+    refused = run("simulate", "--out", out, "--set", "simulator.link_encoder=false")
+    assert refused.exit_code == 2 and "simulator.link_encoder is True, not False" in refused.stderr
+    done = run("fit", out, "--model", "two-inertia", "--no-report")
+    assert done.exit_code == 0, done.output
+    level = Fit.read(out / "fit" / "fit.json").levels[0]
+    assert [one.output for one in level.outputs] == ["motor_position", "link_position"]
 
 
 def test_settings_are_typed_as_ros_does():

@@ -25,7 +25,7 @@ def test_a_dry_run_says_what_it_takes_and_writes_nothing(run, tmp_path: Path, co
     out = tmp_path / "rig"
     done = run(command, "--out", out, *SHORT, "--realizations", 3, "--periods", 2, "--dry-run")
     assert done.exit_code == 0, done.output
-    assert "1 levels, 3 bags of 3000 samples; 3 to record, 9 s of simulated time." in done.stdout
+    assert "1 level, 3 bags of 3000 samples; 3 to record, 9 s of simulated time." in done.stdout
     assert "Disk: " in done.stdout and "Time: about " in done.stdout
     assert not out.exists()
 
@@ -54,7 +54,7 @@ def test_a_search_says_what_a_pass_takes_and_how_many_there_may_be(
 ):
     done = run(*command.split(), "--out", tmp_path / "out", "--realizations", 2, "--dry-run")
     assert done.exit_code == 0, done.output
-    assert "1 levels, 2 bags of 30000 samples; 2 to record" in done.stdout
+    assert "1 level, 2 bags of 30000 samples; 2 to record" in done.stdout
     assert "Disk: " not in done.stdout
     assert f"That is one pass; there are {passes} at the most." in done.stdout
     assert not (tmp_path / "out").exists()

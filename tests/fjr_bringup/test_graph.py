@@ -30,7 +30,7 @@ MODULES = {
 @pytest.mark.parametrize(
     ("rate", "base", "given"),
     [
-        (100.0, 1.0, {"simulator": {"noise_std_rad": 1e-4}}),
+        (100.0, 1.0, {"simulator": {"noise_std_rad": 1e-4, "link_encoder": True}}),
         (
             1000.0,
             1.0,
@@ -42,7 +42,11 @@ MODULES = {
         ),
         (20_000.0, 4.0, {"controller": {"torque_limit_nm": 5.0}}),
     ],
-    ids=["100 Hz, noise by std", "1 kHz, two levels, noise by SNR", "20 kHz, torque limit"],
+    ids=[
+        "100 Hz, noise by std, link encoder",
+        "1 kHz, two levels, noise by SNR",
+        "20 kHz, torque limit",
+    ],
 )
 def test_graph_composed_graph_and_batch_give_the_same_bytes(domain, tmp_path, rate, base, given):
     what = campaign(rate, base, **given)

@@ -49,7 +49,9 @@ def test_two_rigs_of_one_domain_are_told_apart_by_their_namespaces(
     start, domain: int, tmp_path: Path
 ):
     """The bag of one in another namespace is that of any: its topics lie in /rig."""
-    recorder = start("fjr_cli", "record", "--out", str(tmp_path / "cell"), "--namespace", "/cell/a")
+    recorder = start(
+        "fjr_cli", "record", "--out", str(tmp_path / "cell"), "--namespace", "/cell/a", "--link"
+    )
     recorder.wait_for_text("Waiting for a publisher of /cell/a/")
     rig(start, namespace="/cell/a", periods=2)
     start.node("controller_node")
@@ -57,6 +59,7 @@ def test_two_rigs_of_one_domain_are_told_apart_by_their_namespaces(
     record = read_record(tmp_path / "cell" / BAG)
     expected = run_realization(SIMULATOR.defaults(), described(periods=2))
     np.testing.assert_array_equal(record.torque, expected.torque)
+    np.testing.assert_array_equal(record.link, expected.link)
     told = fjr(start, "status", "--namespace", "cell/a")
     assert told.count("level 0, realization 0") >= 2 and "MISSING" not in told, told
     assert "simulator: MISSING, nobody publishes /rig/motor_position" in fjr(start, "status")

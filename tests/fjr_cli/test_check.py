@@ -14,6 +14,16 @@ def test_a_whole_bag_is_well(run, tmp_path):
     assert "every sample is there once" in done.stdout
 
 
+def test_on_eighty_columns_there_are_tables_and_no_list(run, tmp_path, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    write_bag(tmp_path / "bag", experiment())
+    lines = run("check", tmp_path / "bag").stdout.splitlines()
+    rows = [line.split() for line in lines if line.strip().startswith("/rig/motor_torque ")]
+    times, words = rows
+    assert times[1:3] == [str(len(WHOLE)), "1000"] and words[1:4] == ["0", "0", "Jazzy"]
+    assert max(map(len, lines[1:])) <= 80
+
+
 def test_every_bag_is_looked_at_and_one_fault_is_status_1(run, tmp_path):
     write_bag(tmp_path / "bags/whole", experiment())
     lossy = {"r": WHOLE, "y": sorted({*WHOLE} - {9}), "u": WHOLE}

@@ -69,6 +69,16 @@ def test_help_names_every_command_without_importing_numpy():
     assert done.stdout.splitlines()[-1] == "[]"
 
 
+def test_help_breaks_its_paragraphs_at_the_width_of_the_terminal(run, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    said = run("simulate", "--help").stdout.split("Options")[0].splitlines()
+    paragraph = [line.strip() for line in said if line.strip()][3:-1]
+    assert paragraph[0].startswith("With --record") and len(paragraph) > 2
+    following = [line.split()[0] for line in paragraph[1:]]
+    for line, word in zip(paragraph, following, strict=False):
+        assert len(line) + 1 + len(word) > 78, line
+
+
 def test_analyze_prints_numbers_and_the_report_last(run, folder, tmp_path):
     out = tmp_path / "results"
     done = run("analyze", folder, "--out", out)

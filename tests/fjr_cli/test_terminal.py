@@ -49,6 +49,8 @@ def printed(console: Console) -> str:
 def test_analyze_cuts_no_number(console):
     result = make_result()
     analysis_summary.print_summary(result, console)
+    lists = "level 0, " in console.file.getvalue()
+    assert lists == (console.width < 80)
     words = printed(console).split()
     for level in result.levels:
         n = summarize(level)

@@ -26,6 +26,9 @@ SCRIPT = """
   find("button[data-level='1']").click();
   await rest();
   found.wide = state();
+  find("button[data-level='3']").click();
+  await rest();
+  found.bench = state();
   find("button[data-level='0']").click();
   find("[data-scale=log]").click();
   find("[data-unit='rad/s']").click();
@@ -60,8 +63,8 @@ def over(frequency_hz: np.ndarray):
 def found(shown, tmp_path):  # noqa: F811
     narrow, wide = np.linspace(8.0, 40.0, 9), np.geomspace(1.0, 100.0, 9)
     mixed = over(narrow) | {"two": over(wide)["one"]}
-    levels = [over(narrow), over(wide), mixed]
-    page = shown([], items=["narrow", "wide", "mixed"], levels=levels)
+    levels = [over(narrow), over(wide), mixed, over(np.geomspace(13.0, 249.0, 9))]
+    page = shown([], items=["narrow", "wide", "mixed", "bench"], levels=levels)
     file = tmp_path / "page.html"
     file.write_text(page, encoding="utf-8")
     return found_in(file, SCRIPT)
@@ -78,6 +81,11 @@ def test_a_plot_of_less_than_a_decade_has_ticks_on_a_logarithmic_axis(found):
     assert chosen["title"] == "angular frequency (rad/s)" and "rad/s" in chosen["hover"]
     np.testing.assert_allclose(chosen["x"], 2.0 * np.pi * np.linspace(8.0, 40.0, 9), rtol=1e-5)
     assert chosen["ticks"] == [50.0, 100.0, 200.0]
+
+
+def test_a_plot_of_less_than_two_decades_has_ticks_between_the_powers_of_ten(found):
+    assert found["bench"]["type"] == "log"
+    assert found["bench"]["ticks"] == [20.0, 50.0, 100.0, 200.0]
 
 
 def test_a_plot_keeps_its_height_when_the_window_or_the_medium_changes(found):

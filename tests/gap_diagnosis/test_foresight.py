@@ -56,6 +56,13 @@ def test_an_effect_is_named_above_its_limit_and_not_below(effect):
     assert named == [[effect], []]
 
 
+def test_a_plan_that_a_gate_would_stop_says_so():
+    short = {"amplitudes_rad": (2e-3, 2e-2), "transient_periods": 1}
+    for what, stopped in ((short, True), ({}, False)):
+        notes = foresee(planned_record(planned(2e-5, **what)), NOMINAL, effects=["delay"]).notes
+        assert any("still transient" in note for note in notes) == stopped, notes
+
+
 def test_records_of_a_rigid_axis_have_limits():
     rigid = {"jm": 0.5, "fsm": 5.0, "fvm": 3.0, "j": 0.0, "fs": 0.0, "fv": 0.0, "k1": 0.0}
     rigid["k0"] = math.inf
