@@ -157,6 +157,16 @@ def test_hum_on_one_line_is_named_and_no_reason_to_refuse(tmp_path):
     assert [note for note in notes if "0.0002 rad on line 50 (50 Hz)" in note]
 
 
+@pytest.mark.parametrize("hertz", [50.03, 149.96])
+def test_hum_as_strong_as_a_line_is_not_taken_for_one(tmp_path, hertz):
+    values = loop(multisine())
+    t = np.arange(values["r"].size) / RATE_HZ
+    values["r"] = values["r"] + 0.006 * np.sin(2 * np.pi * hertz * t)
+    (record,) = read_files([save(tmp_path, "rig", values)], options()).records
+    assert set(record.repetition.excited) == set(LINES)
+    assert any("not counted as excited" in note for note in record.notes)
+
+
 def test_one_line_of_another_size_is_named_and_another_level_refused(tmp_path):
     other = multisine(1) + 0.004 * np.cos(2 * np.pi * 7 * np.arange(2500) / N)
     files = [save(tmp_path, f"run{n}", loop(r)) for n, r in enumerate(
