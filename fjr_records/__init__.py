@@ -5,7 +5,7 @@ analysis and diagnosis. Begin with `experiment_folder.open_experiment`: what the
 `described` by themselves or `undescribed` and found in their signals (`discover`). `realization`
 reduces a bag to spectra in one pass, `periodic` holds an experiment whole, cut into its periods,
 `records` whatever does not repeat; `lines`, `spectra`, `noise` and `encoder_step` are what these
-rest on. `importers` turn foreign files into bags, of the columns that a map names (`import_files`).
+rest on. `importers` turn foreign files into bags (`importers.importer.import_files`).
 
     >>> from fjr_records import open_experiment, read_experiment
     >>> [(bag.level, bag.realization) for bag in open_experiment("rig").bags]
