@@ -152,8 +152,8 @@ def _left_out(found: ArbitraryBla, played: bool) -> list[str]:
     why = (
         "the torque does not follow the excitation beyond noise and distortion there."
         if played
-        else "position or torque do not stand above noise there, so that G would be that of the "
-        "controller."
+        else "position or torque do not stand above noise there, or the torque cannot be told from "
+        "the transient, as where a sweep begins and ends; G would be that of the controller."
     )
     return [f"{lost.size} of {whole} frequencies are left out ({bands}): {why}"]
 

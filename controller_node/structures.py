@@ -14,7 +14,8 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, TypeAdapter, ValidationError
 
-from fjr_kit.errors import InputError, shown
+from fjr_kit.errors import InputError
+from fjr_kit.result_types import what_is_wrong
 
 from . import polynomials
 from .polynomials import ONE, Ratio
@@ -238,12 +239,7 @@ def structure_of(content: Any, source: str) -> AnyStructure:
         return _ADAPTER.validate_python(content)
     except ValidationError as error:
         problem = error.errors(include_url=False)[0]
-        if not problem["loc"]:  # not even its kind can be read
-            kind = content.get("kind") if isinstance(content, Mapping) else content
-            raise InputError(
-                f"{source}.kind: must be one of {', '.join(KINDS)}, not {shown(kind)}."
-            ) from None
-        what = problem["msg"].removeprefix("Value error, ").replace("Input", "it", 1)
+        what = what_is_wrong(problem)
         where = [str(part) for part in problem["loc"] if part not in KINDS]
         named = (part for part in where if part.isdigit() or part.islower())
         field = ".".join(part for part in named if "[" not in part)

@@ -24,7 +24,6 @@ from fjr_kit.errors import InputError
 from .polynomials import Ratio, added, together
 
 _OUTSIDE = 1.0 + 1e-6  # poles on the unit circle integrate, rounding included
-_CONSISTENT = 1e-9
 
 
 @dataclass(frozen=True)
@@ -146,32 +145,6 @@ class TransferFunction:
     def clamped(self, torque: np.ndarray) -> np.ndarray:
         """Return a torque within the limit."""
         return np.clip(torque, -self.limit_nm, self.limit_nm)
-
-    def steady_state(
-        self, reference: float, position: float, torque: float | None = None
-    ) -> np.ndarray | None:
-        """Return the state in which constant r and y give a constant torque before the limit.
-
-        Args:
-            reference: r (rad).
-            position: y (rad).
-            torque: u (N m); an integrating law has any, where C_r and C_y integrate r - y to
-                nothing. None takes the law's own, and zero for an integrating one.
-
-        Returns:
-            float64 (n,); None if there is no such state.
-        """
-        enters = self.reference * reference - self.position * position
-        rest = float(self.denominator.sum())
-        size = float(np.abs(self.reference * reference).sum() + np.abs(enters).sum())
-        if torque is None:
-            integrates = abs(rest) <= _CONSISTENT * np.abs(self.denominator).sum()
-            torque = 0.0 if integrates else float(enters.sum()) / rest
-        size += abs(torque) * float(np.abs(self.denominator).sum())
-        terms = enters - self.denominator * torque
-        if abs(terms.sum()) > _CONSISTENT * size:
-            return None
-        return np.cumsum(terms[::-1])[::-1][1:]
 
     def entering_state(
         self,

@@ -99,7 +99,7 @@ def _print_estimate(
     keep_bags: bool,
 ) -> None:
     from fjr_kit.worker_pool import worker_count
-    from fjr_validation.blind.estimate import CASE_BYTES, estimate
+    from fjr_validation.blind.check_cost import CASE_BYTES, estimate
 
     found = estimate(out, cases, seed, methods)
     worlds = ", ".join(f"{count} {world}" for world, count in cases.items())

@@ -42,7 +42,7 @@ def paper(
 
 def _print_estimate(out: Path, quick: bool, workers: int | None) -> None:
     from fjr_kit.worker_pool import worker_count
-    from fjr_validation.paper.estimate import estimate
+    from fjr_validation.paper.paper_cost import estimate
     from fjr_validation.paper.reproduction import CACHE
     from fjr_validation.paper.settings import FULL, QUICK
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,7 +30,7 @@ from pydantic import (
 from pydantic_core import core_schema as cs
 from typing_extensions import Self
 
-from .errors import InputError
+from .errors import InputError, shown
 
 _WORDS = {"nan": None, "inf": "Infinity", "-inf": "-Infinity"}
 _FLOATS = {word: float(number) for number, word in _WORDS.items()}
@@ -214,7 +215,7 @@ class Document(ResultModel):
         else:
             if "schema_name" in found.model_fields_set:
                 return found
-            problem = "schema: Field required"
+            problem = "schema: is missing"
         raise InputError(f"{source}: not a {name} file: {problem}; make it again.")
 
     @classmethod
@@ -231,8 +232,31 @@ def first_problem(error: ValidationError) -> str:
     """Return the first problem of a failed validation as 'field: what is wrong'."""
     problem = error.errors(include_url=False)[0]
     where = ".".join(str(part) for part in problem["loc"])
-    what = problem["msg"].removeprefix("Value error, ")
+    what = what_is_wrong(problem)
     return f"{where}: {what}." if where else f"{what}."
+
+
+_PLAIN_WORDS = {
+    "missing": "is missing",
+    "extra_forbidden": "is not known here; remove it or correct its name",
+    "finite_number": "must be a finite number",
+    **dict.fromkeys(("float_parsing", "float_type"), "must be a number"),
+    **dict.fromkeys(("int_parsing", "int_type", "int_from_float"), "must be a whole number"),
+    **dict.fromkeys(
+        ("model_type", "model_attributes_type", "dict_type"), "must be names with values"
+    ),
+}
+
+
+def what_is_wrong(problem: Mapping[str, Any]) -> str:
+    """Return a problem of a failed validation in plain words that follow the name of the field."""
+    if problem["type"] == "union_tag_invalid":
+        tags = problem["ctx"]
+        return f"the kind is {shown(tags['tag'])}; known are {tags['expected_tags']}"
+    if problem["type"] == "union_tag_not_found":
+        return "the kind is missing"
+    said = problem["msg"].removeprefix("Value error, ")
+    return _PLAIN_WORDS.get(problem["type"], re.sub(r"^(Input|List|String) should ", "must ", said))
 
 
 def units(model: type[BaseModel]) -> dict[str, str]:

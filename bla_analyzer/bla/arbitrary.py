@@ -25,6 +25,13 @@ from .windows import ORDER, frequencies, window
 
 INPUT_VARIANCE_LOST = 0.1
 """Var(U)/|U|^2 from which a line is left out: discs no longer cover beyond (`robust`)."""
+LIKE_TRANSIENT = 1e3
+"""Variance of G, over that under an input of the same power spread evenly over the window, from
+which the torque is taken for the transient: what a sweep plays as a record begins or ends has as
+smooth a spectrum as a transient, and only the loop's answer to noise is left to tell G by."""
+ANSWER_TO_NOISE = 0.1
+"""Power of the noise of the position over what the torque moves it by, from which too much of the
+torque may be the loop's answer to that noise: the root of it is the greatest bias over |G|."""
 HIGHEST = 0.45
 """Highest frequency of an estimate over the sample rate."""
 
@@ -139,8 +146,17 @@ def _is_excited(fit: Fit) -> bool:
     if fit.spread * fit.residual[0, 0].real > INPUT_VARIANCE_LOST * power:
         return False
     direct = fit.residual[0, 0].real <= 1e-20 * fit.power[1]
+    return not direct or _moves_of_itself(fit)
+
+
+def _moves_of_itself(fit: Fit) -> bool:
+    """Return whether the torque, which stands for the reference, is more than answers to noise."""
+    even = fit.spread * fit.lines
+    moved, noise = abs(fit.position) ** 2, even / (ORDER + 1) * fit.residual[1, 1].real
+    if even * fit.power[1] > LIKE_TRANSIENT or noise > ANSWER_TO_NOISE * moved:
+        return False
     radius = confidence_radius(np.array(fit.variance), fit.variance_degrees)
-    return not direct or bool(radius < abs(fit.position))
+    return bool(radius < abs(fit.position))
 
 
 def _estimate(

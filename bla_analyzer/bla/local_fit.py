@@ -48,6 +48,7 @@ class Fit:
 
     Attributes:
         torque, position: G_ru and G_ry there.
+        lines: in the window, of all runs.
         spread: variance of G_ru or G_ry over that of a line of U or Y.
         residual: complex (2, 2), covariance of what is left of U and Y at a line.
         noise: the same of noise alone in the mean over repeats; None without repeats.
@@ -61,6 +62,7 @@ class Fit:
 
     torque: complex
     position: complex
+    lines: int
     spread: float
     residual: np.ndarray
     noise: np.ndarray | None
@@ -145,6 +147,7 @@ def fit_window(
     return Fit(
         torque=complex(response[0]),
         position=complex(response[1]),
+        lines=len(columns),
         spread=spread,
         residual=residual,
         noise=noise / noisy if noisy else None,

@@ -45,6 +45,8 @@ SIGNAL_QOS = stated_qos(
 EXPERIMENT_QOS = stated_qos(
     QosHistory.KEEP_LAST, 1, QosReliability.RELIABLE, QosDurability.TRANSIENT_LOCAL
 )
+_PIECE = 2**14
+"""Samples whose messages are held in memory at once."""
 
 
 class BagWriter:
@@ -145,14 +147,18 @@ class BagWriter:
             raise ValueError(f"expected the signals {[signal.symbol for signal in self.signals]}")
         samples = self.experiment.samples or len(values[self.signals[0].symbol])
         stamps = stamps_ns(samples, self.experiment.sample_rate_hz)
-        columns = []
         for signal in self.signals:
             if np.shape(values[signal.symbol]) != stamps.shape:
                 raise ValueError(f"{signal.symbol} must have the shape {stamps.shape}")
-            encoder = JointStateWriter(signal.field, self._joint)
-            columns.append(_rows(encoder.encode_many(stamps, values[signal.symbol])))
-        for stamp, *payloads in zip(stamps.tolist(), *columns, strict=True):
-            self.write(stamp, payloads)
+        encoders = [JointStateWriter(signal.field, self._joint) for signal in self.signals]
+        for at in range(0, samples, _PIECE):
+            piece = slice(at, at + _PIECE)
+            columns = [
+                _rows(encoder.encode_many(stamps[piece], values[signal.symbol][piece]))
+                for encoder, signal in zip(encoders, self.signals, strict=True)
+            ]
+            for stamp, *payloads in zip(stamps[piece].tolist(), *columns, strict=True):
+                self.write(stamp, payloads)
 
     def close(self) -> None:
         """Finish the bag and move it to its place.

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +17,8 @@ from .source import Names, read_text, refuse_bomb
 
 _BYTES_OF_A_NODE, _LEAST = 80, 2**28
 """What a value takes in memory once it is parsed, and what any file may take."""
+_BATCH = 1000
+"""Lines that are parsed at once."""
 
 
 def open_json(path: Path) -> Names:
@@ -27,17 +31,36 @@ def open_json(path: Path) -> Names:
     text = read_text(path)
     refuse_bomb(path, _BYTES_OF_A_NODE * sum(map(text.count, ",[{")), _LEAST)
     content = _parse(path, text)
-    return Names(path, _known(content), lambda name: _column(path, content, name))
+    if isinstance(content, dict) and not any(isinstance(v, (dict, list)) for v in content.values()):
+        content = [content]  # one entry, alone on its line
+    words = _known(content, words=True)
+    return Names(path, _known(content), lambda name: _column(path, content, name), words)
 
 
 def _parse(path: Path, text: str) -> Any:
     try:
         return json.loads(text)
     except ValueError as error:
-        lines = [line for line in text.splitlines() if line.strip()]
-        if len(lines) > 1 and lines[0].lstrip()[:1] in "{[":
-            return [_line(path, number, line) for number, line in enumerate(lines, 1)]
-        raise InputError(f"{path}: is not JSON ({_what(error)}).") from None
+        lines = (found.group() for found in re.finditer(r"\S[^\n]*", text))
+        first = next(lines, "")
+        if first[:1] not in ("{", "[") or next(lines, None) is None:
+            raise InputError(f"{path}: is not JSON ({_what(error)}).") from None
+    lines = (found.group() for found in re.finditer(r"\S[^\n]*", text))
+    entries: list[Any] = []
+    while batch := list(islice(lines, _BATCH)):
+        entries += _batch(path, batch, len(entries) + 1)
+    return entries
+
+
+def _batch(path: Path, lines: list[str], number: int) -> list[Any]:
+    """Return the entries of some lines, which share the names of their fields in memory."""
+    try:
+        entries = json.loads(f"[{','.join(lines)}]")
+        if len(entries) == len(lines):
+            return entries
+    except ValueError:
+        pass
+    return [_line(path, number + at, line) for at, line in enumerate(lines)]
 
 
 def _line(path: Path, number: int, line: str) -> Any:
@@ -51,11 +74,12 @@ def _what(error: ValueError) -> str:
     return str(error).splitlines()[0].rstrip(".")[:80]
 
 
-def _known(content: Any, prefix: str = "") -> list[str]:
-    """Return the paths of all columns, as the first entry of each list shows them."""
+def _known(content: Any, prefix: str = "", *, words: bool = False) -> list[str]:
+    """Return the paths of all columns, of words if asked, as the first entry of each list shows."""
     if isinstance(content, dict):
         inside = [
-            _known(value, f"{prefix}.{key}" if prefix else key) for key, value in content.items()
+            _known(value, f"{prefix}.{key}" if prefix else key, words=words)
+            for key, value in content.items()
         ]
         return [path for paths in inside for path in paths]
     if not isinstance(content, list) or not content:
@@ -64,7 +88,7 @@ def _known(content: Any, prefix: str = "") -> list[str]:
         return [
             f"{prefix}.{key}" if prefix else key
             for key, value in content[0].items()
-            if not isinstance(value, (dict, str))
+            if not isinstance(value, dict if words else (dict, str))
         ] + [
             path
             for key, value in content[0].items()

@@ -15,7 +15,7 @@ from . import coherence
 from .columns import read_columns
 from .import_map import Column
 from .repetition import Repetition, find_repetition
-from .stamps import Timing, read_timing, resample
+from .stamps import LONGEST_S, Timing, read_timing, resample
 
 SYMBOLS = {"reference": "r", "torque": "u", "position": "y", "link": "q"}
 LEAST_SAMPLES = 16
@@ -130,11 +130,19 @@ def read_samples(path: Path, options: ImportOptions) -> Samples:
         raise InputError(f"{path}: no samples are left after {first} skipped ones.")
     if left < LEAST_SAMPLES:
         raise InputError(
-            f"{path}: {left} samples are too few for a record; give {LEAST_SAMPLES} or more."
+            f"{path}: {left} sample{'s are' if left > 1 else ' is'} too few for a record; give "
+            f"{LEAST_SAMPLES} or more."
         )
-    timing = read_timing(path, values.pop("time", None), options.sample_rate_hz)
+    meant = "time" in columns and columns["time"].by_factor
+    timing = read_timing(path, values.pop("time", None), options.sample_rate_hz, slow=meant)
     if timing.kept is not None:
         values = {quantity: each[timing.kept] for quantity, each in values.items()}
+    left = values["position"].size
+    if left < LEAST_SAMPLES or left > LONGEST_S * timing.rate_hz:
+        raise InputError(
+            f"{path}: {left} samples at {timing.rate_hz:g} Hz are no record; give at least "
+            f"{LEAST_SAMPLES} samples, in at most {LONGEST_S:g} s."
+        )
     return Samples(path, values, timing, notes)
 
 
@@ -159,6 +167,8 @@ def understand(samples: Samples, rate_hz: float, options: ImportOptions) -> Reco
     found = find_repetition(str(path), signals, rate_hz, options)
     repetition = found if isinstance(found, Repetition) else None
     doubts = _unit_doubts(path, signals, repetition, options.columns)
+    if not np.ptp(signals["u"]) > 0:
+        doubts += ("the torque is constant, so no response can be told from this run",)
     other = coherence.unrelated(signals, repetition)
     if other is not None:
         raise InputError(f"{path}: {other}.")

@@ -21,6 +21,9 @@ STRAY = 0.1
 not played: mains hum, a limit cycle, rounding."""
 MOST_STRAY = 0.02
 """Greatest part of the lines that can be such strays; one line always can."""
+WANDERS = 0.1
+"""Greatest difference of a line between one period and their mean, relative to it, of one that was
+played: mains hum is no whole number of cycles in a period."""
 ABOVE_NOISE = 4.0
 """Least ratio of what repeats in torque and position to what does not, at the excited lines, in
 power, where noise alone gives 1."""
@@ -128,8 +131,11 @@ def _find(name: str, reference: np.ndarray, rate_hz: float, asked: Asked) -> Rep
     if asked.excited_harmonics is not None:
         excited, amplitudes = _given_lines(name, mean, asked.excited_harmonics)
     else:
-        excited, amplitudes, strays = _played(*find_lines(name, mean))
-        notes += [_stray(line, size, rate_hz / samples) for line, size in strays]
+        excited, amplitudes, wandering = _steady(kept, *find_lines(name, mean))
+        excited, amplitudes, strays = _played(excited, amplitudes)
+        base_hz = rate_hz / samples
+        notes += [_note(*each, base_hz, "differs from period to period") for each in wandering]
+        notes += [_note(*each, base_hz, "is too weak to have been played") for each in strays]
     return Repetition(samples, transient, periods, excited, amplitudes, tuple(notes))
 
 
@@ -194,10 +200,22 @@ def _played(excited: np.ndarray, amplitudes: np.ndarray) -> tuple[np.ndarray, np
     return excited[~weak], amplitudes[~weak], strays
 
 
-def _stray(line: int, amplitude: float, base_hz: float) -> str:
+def _steady(
+    kept: np.ndarray, excited: np.ndarray, amplitudes: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, Strays]:
+    """Part the lines that every period has from those that come and go."""
+    lines = line_spectrum(kept)[:, excited]
+    apart = np.abs(lines - lines.mean(axis=0)).max(axis=0) > WANDERS * amplitudes
+    if not apart.any() or apart.sum() > max(1, MOST_STRAY * excited.size):
+        return excited, amplitudes, []
+    strays = list(zip(excited[apart].tolist(), amplitudes[apart].tolist(), strict=True))
+    return excited[~apart], amplitudes[~apart], strays
+
+
+def _note(line: int, amplitude: float, base_hz: float, why: str) -> str:
     return (
-        f"the reference has {amplitude:.3g} rad on line {line} ({line * base_hz:.4g} Hz), which is "
-        "too weak to have been played and is not counted as excited"
+        f"the reference has {amplitude:.3g} rad on line {line} ({line * base_hz:.4g} Hz), which "
+        f"{why} and is not counted as excited"
     )
 
 

@@ -20,6 +20,14 @@ from fjr_kit.errors import InputError
 
 FASTEST_HZ = 1e6
 """Greatest sample rate of an experiment description."""
+SLOWEST_HZ = 2.0
+"""Least rate of a rig whose time column is in s: a slower one is in ms or us and taken for s."""
+LONGEST_S = 1e8
+"""Longest record, three years; more is no time in s."""
+LONG_GAP = 10.0
+"""A step of so many usual ones, in which more is lost than can be resampled, ends a stretch..."""
+FEW = 0.01
+"""... if such steps are at most this part of all: else they are how the logger works."""
 UNEVEN = 0.01
 """Greatest deviation of one time step from the mean one, relative to it, of even stamps."""
 GREATEST_ERROR = 0.2
@@ -53,8 +61,20 @@ class Timing:
     kept: np.ndarray | None = None
 
 
-def read_timing(path: Path, time: np.ndarray | None, given_hz: float | None) -> Timing:
-    """Understand the time column of a file, in s; raise InputError."""
+def read_timing(
+    path: Path, time: np.ndarray | None, given_hz: float | None, *, slow: bool = False
+) -> Timing:
+    """Understand the time column of a file.
+
+    Args:
+        path: the file.
+        time: its time column in s, (samples,); None without one.
+        given_hz: sample rate that the user gave.
+        slow: whether it may be slower than SLOWEST_HZ.
+
+    Raises:
+        InputError: it is no time, or not in s.
+    """
     if time is None:
         if given_hz is None or not 0 < given_hz <= FASTEST_HZ:
             raise InputError(
@@ -70,6 +90,7 @@ def read_timing(path: Path, time: np.ndarray | None, given_hz: float | None) -> 
             "second; correct its unit."
         )
     steps = np.diff(time)
+    _refuse_slow(path, time, slow)
     falling = np.flatnonzero(steps < 0)
     if falling.size:
         at = int(falling[0])
@@ -77,6 +98,9 @@ def read_timing(path: Path, time: np.ndarray | None, given_hz: float | None) -> 
             f"{path}: the time column goes back from {time[at]:g} to {time[at + 1]:g} s after "
             f"sample {at}; map another column, or cut the record there."
         )
+    stretch = _longest_stretch(steps)
+    if stretch is not None:
+        return _of_stretch(path, time, given_hz, stretch, slow)
     if (np.abs(steps - step) <= UNEVEN * step).all():
         return Timing(None, _same(path, _whole(1.0 / step, 1e-6), given_hz))
     rounded = _rounded_rate(time)
@@ -85,6 +109,52 @@ def read_timing(path: Path, time: np.ndarray | None, given_hz: float | None) -> 
         note = f"its stamps are rounded to {digit:g} s and taken as even, {rate:.6g} samples/s"
         return Timing(None, _same(path, rate, given_hz), notes=(note,))
     return _uneven(path, time, given_hz)
+
+
+def _refuse_slow(path: Path, time: np.ndarray, slow: bool) -> None:
+    """Raise InputError if the time column is evidently not in s."""
+    span, steps = time[-1] - time[0], np.diff(time)
+    usual = float(np.median(steps))
+    if span > LONGEST_S or (usual > 1.0 / SLOWEST_HZ and not slow):
+        raise InputError(
+            f"{path}: the time column goes on by {usual:g} s from sample to sample, as if it were "
+            "in ms, us or ns and taken for s; give its unit, as in time=COLUMN:ms, or a factor."
+        )
+
+
+def _longest_stretch(steps: np.ndarray) -> slice | None:
+    """Return the samples of the longest stretch between long gaps; None without such gaps."""
+    rising = steps[steps > 0]
+    gaps = np.flatnonzero(steps > LONG_GAP * np.median(rising)) if rising.size else rising
+    if not gaps.size or gaps.size > max(1.0, FEW * steps.size):
+        return None
+    ends = np.concatenate([[0], gaps + 1, [steps.size + 1]])
+    at = int(np.diff(ends).argmax())
+    return slice(int(ends[at]), int(ends[at + 1]))
+
+
+def _of_stretch(
+    path: Path, time: np.ndarray, given_hz: float | None, stretch: slice, slow: bool
+) -> Timing:
+    """Return the timing of one stretch of a file, which is kept alone."""
+    of_stretch = read_timing(path, time[stretch], given_hz, slow=slow)
+    steps = np.diff(time)
+    gaps = steps[steps > LONG_GAP * np.median(steps[steps > 0])]
+    kept = np.arange(time.size)[stretch]
+    if of_stretch.kept is not None:
+        kept = kept[of_stretch.kept]
+    times = f"{gaps.size} time{'s' * (gaps.size != 1)}"
+    note = (
+        f"its time column jumps {times}, by up to {gaps.max():.4g} s; only the longest stretch "
+        f"without a jump is kept, samples {stretch.start} to {stretch.stop - 1} of {time.size}"
+    )
+    return replace(
+        of_stretch,
+        gaps=of_stretch.gaps + gaps.size,
+        longest_gap_s=float(gaps.max()),
+        notes=(note, *of_stretch.notes),
+        kept=kept,
+    )
 
 
 def _uneven(path: Path, time: np.ndarray, given_hz: float | None) -> Timing:

@@ -18,8 +18,9 @@ _DELIMITERS = ("\t", ";", ",", "|", None)
 """None stands for white space."""
 _COMMENTS = ("#", "%", "//", "!", "$")
 _LOOKED_AT = 100
-_NOWHERE = 2**62
 """Lines that tell delimiter and decimal mark."""
+_NOWHERE = 2**62
+"""Number of a line that no file has."""
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?|[+-]?(nan|inf(inity)?)", re.I)
 
 

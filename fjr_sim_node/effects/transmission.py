@@ -109,7 +109,7 @@ TRANSMISSION: tuple[Effect, ...] = (
             EffectParameter("frequency_hz", 30.0, "Hz", "Its natural frequency with the link held",
                             0.1, 2000.0, fit=(0.04, 2.4)),
             EffectParameter("damping_ratio", 0.02, "", "Its damping ratio with the link held",
-                            0.0, 2.0, fit=(0.0, 0.5)),
+                            0.0, 2.0, fit=(0.0, 0.2)),
         ),
         (
             {"inertia_kg_m2": (2e-3,), "frequency_hz": _MODES, "damping_ratio": (0.03,)},

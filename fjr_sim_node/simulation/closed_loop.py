@@ -144,8 +144,8 @@ def simulate_law(
         elapsed_s: time since the rig was switched on, for what drifts.
         added_torque: torque beside the controller's, (samples,) in N m; None for none.
         start: position (rad) and velocity (rad/s) of all bodies at the first sample.
-        controller_state: state of the law before it, such as its `steady_state` or the
-            `entering_state` of a record; None for zero.
+        controller_state: state of the law before it, such as the `entering_state` of a record;
+            None for zero.
         substeps: parts of a sample in which the plant is integrated, at least.
 
     Raises:

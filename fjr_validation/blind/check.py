@@ -45,8 +45,6 @@ from .making import make_sealed
 from .methods import check_methods, verdicts
 from .seal import Secret, digest, opened_line
 
-MOST_CASES = 10_000
-
 Report = Callable[[int, int, str], None]
 """Called with (done, all, what was done)."""
 

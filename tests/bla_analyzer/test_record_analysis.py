@@ -87,6 +87,21 @@ def test_without_reference_no_line_shows_the_inverse_of_the_controller(tmp_path,
     assert any("do not stand above noise" in note for note in result.notes)
 
 
+@pytest.mark.parametrize("noise", [1e-2, 1e-3, 1e-4])
+@pytest.mark.parametrize("kind", ["chirp", "trapezoid"])
+def test_without_reference_what_tells_no_torque_from_its_transient_is_left_out(
+    tmp_path, kind, noise
+):
+    """A sweep has the spectrum of a transient at both ends of its band, a move zeros within."""
+    write(tmp_path / "rig" / "one", data(kind=kind, noise=noise), symbols="uy")
+    result = analyze(tmp_path / "rig")
+    bla = result.levels[0].bla
+    exact = rigs.truth(rigs.random_rig(3, linear=True), bla.frequency_hz)
+    assert np.abs(np.log(np.abs(bla.g / exact))).max() < {"chirp": 0.1, "trapezoid": 0.4}[kind]
+    assert bla.g.size > 20
+    assert any("where a sweep begins and ends" in note for note in result.notes)
+
+
 def test_without_reference_nothing_is_shown_as_one(tmp_path):
     for level in (0, 1):
         record = data(seed=level) * (1.0 + level)

@@ -146,21 +146,6 @@ def test_the_cascade_is_what_its_words_say():
     assert np.allclose(by_steps(law, r, y), expected, rtol=1e-7, atol=1e-6)
 
 
-@pytest.mark.parametrize("described", [CASCADE, PID], ids=lambda d: d["kind"])
-def test_a_steady_state_stays(described):
-    law = law_of(described, RATE)
-    # An integrating cascade or PID rests at any torque where r = y.
-    still = 0.3 * np.ones(50)
-    state = law.steady_state(0.3, 0.3, 5.0)
-    assert np.allclose(by_steps(law, still, still, state), 5.0, atol=1e-9)
-    assert np.allclose(law.unlimited(still, still, state), 5.0, atol=1e-9)
-    assert law.steady_state(0.3, 0.2, 5.0) is None
-    proportional = law_of({"kind": "p_pi", "k_position": 3.0, "k_velocity": 2.0}, RATE)
-    state = proportional.steady_state(0.5, 0.1)
-    assert np.allclose(by_steps(proportional, 0.5 + 0 * still, 0.1 + 0 * still, state), 2.4)
-    assert proportional.steady_state(0.5, 0.1, 7.0) is None
-
-
 def test_a_record_cut_in_the_middle_is_simulated_on_from_its_states():
     law = law_of(CASCADE, RATE)
     reference = 0.2 * np.sin(np.arange(3000) / 200.0)

@@ -1,4 +1,4 @@
-"""Who imports whom: packages in one order, folders and modules without a circle.
+"""Who imports whom: packages in one order, folders and modules without a circle, names once.
 
 Imports within functions count; those that only type checkers read (`if TYPE_CHECKING`) do not.
 """
@@ -6,6 +6,7 @@ Imports within functions count; those that only type checkers read (`if TYPE_CHE
 from __future__ import annotations
 
 import ast
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from graphlib import TopologicalSorter
 from importlib.util import resolve_name
@@ -81,3 +82,9 @@ def test_no_folders_import_each_other_in_a_circle():
     for module, others in ARROWS.items():
         arrows.setdefault(folder(module), set()).update(map(folder, others))
     refuse_circle({place: others - {place} for place, others in arrows.items()})
+
+
+def test_no_file_name_stands_twice_in_a_package():
+    names = Counter((name.partition(".")[0], file.name) for name, file in FILES.items())
+    twice = {name for name, times in names.items() if times > 1}
+    assert {name for name in twice if name[1] not in ("__init__.py", "__main__.py")} == set()

@@ -10,11 +10,11 @@ from graph_runs import campaign, in_batch
 from fjr_bringup.campaign.estimate import estimate
 from fjr_bringup.design.amplitude import EXTRA, STEP, most_levels
 from fjr_validation.blind.check import BlindCheck
-from fjr_validation.blind.estimate import MAKING_S
-from fjr_validation.blind.estimate import estimate as blind_estimate
+from fjr_validation.blind.check_cost import MAKING_S
+from fjr_validation.blind.check_cost import estimate as blind_estimate
 from fjr_validation.blind.json_lines import JsonLines
 from fjr_validation.paper import fig4
-from fjr_validation.paper.estimate import estimate as paper_estimate
+from fjr_validation.paper.paper_cost import estimate as paper_estimate
 from fjr_validation.paper.settings import QUICK
 
 SHORT = ("--set", "excitation.base_frequency_hz=1.0", "--set", "excitation.f_min_hz=1.0")

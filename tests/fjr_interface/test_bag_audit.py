@@ -149,7 +149,7 @@ def test_bad_descriptions(tmp_path):
         ("relative_file_paths:\n  - bag.mcap", "relative_file_paths: []", "relative_file_paths: "),
         ("message_count: 60", "message_count: 61", "is not the sum over the topics"),
         ("message_count: 181", "message_count: 182", "is not the sum over the topics"),
-        ("rosbag2_bagfile_information:", "other:", "rosbag2_bagfile_information: Field required"),
+        ("rosbag2_bagfile_information:", "other:", "rosbag2_bagfile_information: is missing"),
         ("version: 9", "version: [9", "is corrupted (not YAML)"),
         ("version: 9", "version: 2024-99-99", "rosbag2_bagfile_information.version: "),
         ("version: 9", "version: " + "[" * 50_000, "is corrupted (not YAML)"),

@@ -3,6 +3,7 @@ from __future__ import annotations
 import resource
 import subprocess
 import sys
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +17,9 @@ from rosbags.rosbag2 import Reader
 from ruamel.yaml import YAML
 
 from fjr_interface.bags.joint_state import JointStateWriter
+from fjr_interface.bags.reader import read_record
 from fjr_interface.bags.writer import BagWriter
-from fjr_interface.experiment import Experiment
+from fjr_interface.experiment import Experiment, RecordDescription
 from fjr_interface.topics import JOINT, LINK_POSITION, SIGNAL_DEPTH, SIGNALS
 from fjr_kit.errors import InputError
 
@@ -137,6 +139,19 @@ def test_arrays_must_fit_the_experiment(tmp_path):
         with pytest.raises(ValueError, match="signals"):
             writer.write_arrays(r=values["r"], y=values["y"])
         writer.write_arrays(**values)
+
+
+def test_a_long_record_takes_no_memory_beside_its_arrays(tmp_path):
+    samples = 2**17
+    description = RecordDescription.of("test", sample_rate_hz=1000.0)
+    values = dict.fromkeys("ruy", np.zeros(samples))
+    tracemalloc.start()
+    with BagWriter(tmp_path / "bag", description) as writer:
+        writer.write_arrays(**values)
+        peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 200 * samples
+    assert read_record(tmp_path / "bag").position.size == samples
 
 
 def test_an_existing_folder_is_refused_and_kept(tmp_path):

@@ -42,10 +42,10 @@ def test_the_published_example_is_a_record_and_one_without_kind_a_multisine():
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        (PUBLISHED.replace("record", "chirp"), "kind: Input should be 'multisine' or 'record'"),
-        (PUBLISHED.replace("1000.0", "-1"), "sample_rate_hz: Input should be greater than 0"),
+        (PUBLISHED.replace("record", "chirp"), "kind: must be 'multisine' or 'record'"),
+        (PUBLISHED.replace("1000.0", "-1"), "sample_rate_hz: must be greater than 0"),
         (PUBLISHED[:-1], "Invalid JSON"),
-        ("[]", "Input should be an object"),
+        ("[]", "must be names with values"),
     ],
 )
 def test_a_bad_description_is_named(text, says):

@@ -103,7 +103,7 @@ def test_an_array_that_would_lose_its_values_is_refused():
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("{}", "schema: Field required"),
+        ("{}", "schema: is missing"),
         ('{"schema": "fjr_rig/found/2"}', "schema"),
         ('{"schema": "fjr_rig/found/1", "rms": "1.0"}', "rms"),
         ('{"schema": "fjr_rig/found/1", "rms": NaN}', "rms"),

@@ -93,6 +93,11 @@ def test_json_of_rows_and_of_lines(tmp_path):
     np.testing.assert_array_equal(read_columns(tmp_path / "log.jsonl", ["y"])["y"], Y)
 
 
+def test_json_of_one_line_is_one_entry(tmp_path):
+    (tmp_path / "rig.jsonl").write_text('{"r": 1.5, "y": 2}\n')
+    assert read_columns(tmp_path / "rig.jsonl", ["r"])["r"].tolist() == [1.5]
+
+
 def test_mat_with_signals_in_rows(tmp_path):
     savemat(tmp_path / "rig.mat", {"rec": {"pos": np.stack([R, Y]), "t": T[None, :]}})
     found = read_columns(tmp_path / "rig.mat", ["rec.pos[1]", "rec.t"])
@@ -133,10 +138,14 @@ BROKEN = [
     ("a.json", '[{"r": 1, "y": 2}, {"r": 1}]', "entry 1 has no y"),
     ("a.json", '[{"r": 1, "y": 2}, {"r": 1, "y": null}]', "y is None in entry 1, not a number"),
     ("a.json", '[{"r": 1, "y": 2}, {"r": 1, "y": "x"}]', "y is 'x' in entry 1, not a number"),
+    ("a.json", '{"log": [{"r": 1, "y": "x"}]}', "there is no r; the file holds log.r"),
+    ("a.json", '[{"r": 1, "y": "x"}, {"r": 1, "y": "z"}]', "y is 'x' in entry 0, not a number"),
     ("a.json", '[{"r": 1, "y": 2}, {"r": 1, "y": NaN}]', "y holds nan at sample 1"),
     ("a.json", '[{"r": 1, "y": [2]}, {"r": 1, "y": [2, 3]}]', "y has rows of different lengths"),
     ("a.json", "[" * 100_000, "(is not JSON|nested too deeply)"),
     ("a.jsonl", '{"r": 1, "y": 2}\n{"r": 1,\n', "entry 2"),
+    ("a.jsonl", '{"r": 1, "y": 2}\n{"r": [1\n2], "y": 2}\n', "entry 2"),
+    ("a.jsonl", '{"r": 1, "y": 2}\n' * 1500 + "{", "entry 1501"),
     ("a.mat", "x" * 100, "is not a readable MAT file"),
     ("a.npz", "x" * 300, "is not a NPZ archive"),
     ("a.parquet", "PAR1", "cannot tell the format"),

@@ -157,6 +157,16 @@ def test_hum_on_one_line_is_named_and_no_reason_to_refuse(tmp_path):
     assert [note for note in notes if "0.0002 rad on line 50 (50 Hz)" in note]
 
 
+@pytest.mark.parametrize("hertz", [50.03, 149.96])
+def test_hum_as_strong_as_a_line_is_not_taken_for_one(tmp_path, hertz):
+    values = loop(multisine())
+    t = np.arange(values["r"].size) / RATE_HZ
+    values["r"] = values["r"] + 0.006 * np.sin(2 * np.pi * hertz * t)
+    (record,) = read_files([save(tmp_path, "rig", values)], options()).records
+    assert set(record.repetition.excited) == set(LINES)
+    assert any("not counted as excited" in note for note in record.notes)
+
+
 def test_one_line_of_another_size_is_named_and_another_level_refused(tmp_path):
     other = multisine(1) + 0.004 * np.cos(2 * np.pi * 7 * np.arange(2500) / N)
     files = [save(tmp_path, f"run{n}", loop(r)) for n, r in enumerate(
@@ -207,6 +217,51 @@ def test_uneven_stamps_are_resampled_and_the_error_is_stated(tmp_path, kind):
     expected = sampled(grid)["y"][inner]
     error = np.std(record.signals["y"][inner] - expected) / np.std(expected)
     assert error < (0.05 if kind == "repeated" else 2e-3)
+
+
+@pytest.mark.parametrize("jitter", [0.0, 1e-4])
+def test_a_long_gap_is_not_bridged_but_ends_the_part_that_is_kept(tmp_path, jitter):
+    stamps = np.delete(np.arange(3000) / 500, slice(900, 1400))
+    stamps = stamps + jitter * np.random.default_rng(4).uniform(-1, 1, stamps.size)
+    (record,) = read_files([save(tmp_path, "rig", sampled(stamps))], options(*TIMED)).records
+    assert record.sample_rate_hz == 500.0 and 1590 < record.samples <= 1600
+    assert "samples 900 to 2499 of 2500" in record.notes[0]
+    assert record.timing.gaps == 1 and 0.9 < record.timing.longest_gap_s < 1.1
+    expected = sampled(stamps[900] + np.arange(record.samples) / 500)["y"]
+    assert np.std((record.signals["y"] - expected)[40:-40]) < 2e-3 * np.std(expected)
+
+
+def test_a_logger_that_writes_in_bursts_is_not_cut_at_each_of_them(tmp_path):
+    stamps = (0.02 * np.arange(400)[:, None] + 1e-4 * np.arange(10)).ravel()
+    (record,) = read_files([save(tmp_path, "rig", sampled(stamps))], options(*TIMED)).records
+    assert record.samples / record.sample_rate_hz == pytest.approx(8.0, abs=0.1)
+
+
+@pytest.mark.parametrize("times", [1e3, 1e6, 1e9])
+def test_a_time_that_is_not_in_seconds_is_refused_unless_a_factor_says_that_it_is(tmp_path, times):
+    even = np.arange(2000) / 500
+    file = save(tmp_path, "rig", {**sampled(even), "t": even * times})
+    with pytest.raises(InputError, match=r"as if it were in ms, us or ns .* time=COLUMN:ms"):
+        read_files([file], options(*TIMED))
+    with pytest.raises(InputError, match=r"give its unit|are no record"):
+        read_files([file], ImportOptions(parse_map([*MAP, "time=t:1e9"])))
+    right = {1e3: "ms", 1e6: "us", 1e9: "ns"}[times]
+    for unit in (right, f"{1 / times:g}"):
+        (record,) = read_files([file], ImportOptions(parse_map([*MAP, f"time=t:{unit}"]))).records
+        assert record.sample_rate_hz == pytest.approx(500.0)
+
+
+def test_slow_samples_are_taken_where_a_factor_says_that_they_are_meant(tmp_path):
+    even = np.arange(2000) / 500
+    file = save(tmp_path, "rig", {**sampled(even), "t": even * 1e3})
+    (record,) = read_files([file], ImportOptions(parse_map([*MAP, "time=t:1"]))).records
+    assert record.sample_rate_hz == pytest.approx(0.5)
+
+
+def test_a_torque_that_never_changes_is_doubted(tmp_path):
+    values = {**loop(chirp()), "u": np.full(3000, 2.0)}
+    (record,) = read_files([save(tmp_path, "rig", values)], options()).records
+    assert any("the torque is constant" in doubt for doubt in record.doubts)
 
 
 def test_uneven_files_come_onto_one_grid(tmp_path):
