@@ -61,7 +61,8 @@ class Tested:
         gain: what leaving it out loses on unseen parts.
         without: the fit that lacks it.
         invariance_p: see `invariance`; None with one level.
-        certain: whether the interval of its size lacks zero, and no parameter is at its bound.
+        certain: whether the interval of its size lacks zero.
+        bounded: whether a parameter lies where the fit may go no further.
         share: how much of what the refit left comes back without it, on unseen parts that select.
         in_band: how much of what is left without it, it closes where it gains most; see `closed`.
     """
@@ -71,6 +72,7 @@ class Tested:
     without: CellFit
     invariance_p: float | None
     certain: bool
+    bounded: bool
     share: Figure
     in_band: float
 
@@ -85,7 +87,8 @@ class Tested:
         same = self.invariance_p is None or self.invariance_p >= LEAST_INVARIANCE_P
         closes = self._closes
         least = LEAST_PRESENT if self.certain else _UNCERTAIN * LEAST_PRESENT
-        return self.gain.present and same and closes and self.present >= least
+        there = self.gain.present and closes and not self.bounded
+        return there and same and self.present >= least
 
     @property
     def _closes(self) -> bool:
@@ -93,10 +96,10 @@ class Tested:
 
         Where friction stops a motor is chance, and a few such places hold most of a squared error.
         """
-        low, value = self.share.low, self.share.value
+        low, high = self.share.low, self.share.high
         if low is None or not low <= 0.0:  # NaN: one part says nothing
             return True
-        return value > 0.0 and self.in_band >= LEAST_IN_BAND
+        return high is not None and high > 0.0 and self.in_band >= LEAST_IN_BAND
 
     @property
     def present(self) -> float:
@@ -109,7 +112,7 @@ class Tested:
         of_all = self.share.low if self.share.low is not None and self.share.low > 0.0 else 0.0
         closed = max(self.in_band, of_all, 0.0)
         sure *= closed / (closed + _DOUBTED * (1.0 - closed))
-        if not self.certain:
+        if not self.certain or self.bounded:
             sure *= _UNCERTAIN
         if self.invariance_p is not None and self.invariance_p < LEAST_INVARIANCE_P:
             sure *= 0.5
@@ -132,14 +135,14 @@ def tested_causes(
     estimates = cell_estimates(fit, fitter, scatter, fewer)
     found = []
     for effect, without in fewer.items():
-        there = beyond_zero(effect, estimates, fitter.fall(fit, without))
         found.append(
             Tested(
                 effect,
                 gain(fitter, fit, without, fitter.acted(fit, effect)),
                 without,
                 invariance(fitter, fit, effect, scatter),
-                there and not at_its_bound(fit, effect),
+                beyond_zero(effect, estimates, fitter.fall(fit, without)),
+                at_its_bound(fit, effect),
                 ledger.share(without.model, fit.model, refit.model),
                 fitter.closed(fit, without),
             )

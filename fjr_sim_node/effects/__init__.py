@@ -39,6 +39,7 @@ __all__ = [
     "holders",
     "near_equivalents",
     "parameter",
+    "rare",
 ]
 
 CATALOGUE: tuple[Effect, ...] = (*FRICTION, *TRANSMISSION, *DRIVE, *ENCODER)
@@ -93,6 +94,11 @@ def holders(identifier: str) -> frozenset[str]:
     """Return the effects that hold one as a limit case and are looked for on request only."""
     found = (e.identifier for e in CATALOGUE if e.on_request and identifier in e.contains)
     return frozenset(found)
+
+
+def rare(effects: Collection[str]) -> int:
+    """Return how many of some effects are rarer than one that looks much like them."""
+    return sum(bool(EFFECTS[effect].rarer_than) for effect in effects)
 
 
 def contains(richer: Collection[str], simpler: Collection[str]) -> bool:

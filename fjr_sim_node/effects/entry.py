@@ -84,6 +84,7 @@ class Effect:
         ripple: whether it is periodic in the motor angle, so that `cycles_per_turn` is searched.
         scales: whether it scales the parameters of the bare plant, wholly or about one angle.
         contains: effects that it holds as limit cases, which explain what they can with less.
+        rarer_than: the commoner effect that is named where the data cannot tell it from this one.
         modifies: the effect that brings in what this one changes, so that a rig which lacks that
             has nothing to change; empty if it stands by itself.
         on_request: whether a diagnosis looks for it only if it is asked to, or if a law that it
@@ -107,6 +108,7 @@ class Effect:
     ripple: bool = False
     scales: bool = False
     contains: tuple[str, ...] = ()
+    rarer_than: str = ""
     modifies: str = ""
     on_request: bool = False
     of_bare_plant: bool = False

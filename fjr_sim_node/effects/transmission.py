@@ -150,6 +150,7 @@ TRANSMISSION: tuple[Effect, ...] = (
         ),
         ({"stiffness_nm_rad": (0.01, 0.1), "rest_rad": (0.0,)},),
         looks_like="constant torque",
+        rarer_than="gravity",
         axis="both",
     ),
     Effect(

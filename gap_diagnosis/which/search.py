@@ -86,7 +86,10 @@ class Search:
             scores.append(self.misfit(fit) * (1.0 if amplitudes is None else amplitudes))
         best = close[scores.index(min(scores))]
         tied = [best, *self._tied(best)]
-        return min(tied, key=lambda fit: (len(fit.space.effects), self.misfit(fit)))
+        return min(
+            tied,
+            key=lambda fit: (len(fit.space.effects), fx.rare(fit.effects), self.misfit(fit)),
+        )
 
     def run(self) -> Attribution:
         """Search and judge."""

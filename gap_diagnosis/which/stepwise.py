@@ -249,7 +249,8 @@ class Stepwise:
     def _chosen(self, fits: Sequence[CellFit], parent: CellFit) -> CellFit | None:
         """Return the best fit whose gain repeats, unless another one gains much more.
 
-        Of those that unseen parts cannot tell from it, the one with the fewest parameters.
+        Of those that unseen parts cannot tell from it, the one with the fewest parameters, and then
+        the commoner one.
         """
         gains = [gain(self._fitter, fit, parent, fit.acts) for fit in fits]
         repeating = [
@@ -262,7 +263,7 @@ class Stepwise:
         first = repeating[0]
         worth = self._gain(first, parent).mean
         alike = [f for f in repeating if f is first or stands_for(self._gain(first, f), worth)]
-        return min(alike, key=lambda fit: len(fit.space.effects))
+        return min(alike, key=lambda fit: (len(fit.space.effects), fx.rare(fit.effects)))
 
     def _tied(self, chosen: CellFit, fits: Sequence[CellFit], parent: CellFit) -> list[str]:
         """Return the effects that unseen parts cannot tell from the chosen one."""

@@ -76,6 +76,14 @@ def test_what_an_effect_contains_is_another_effect_of_the_table() -> None:
     assert not fx.contains(("delay", "torque_speed_limit"), ("torque_saturation",))
 
 
+def test_what_is_rarer_is_a_near_equivalent_of_the_commoner_effect() -> None:
+    rarer = [effect for effect in fx.CATALOGUE if effect.rarer_than]
+    assert "external_spring" in {effect.identifier for effect in rarer}
+    for effect in rarer:
+        assert effect.rarer_than in fx.near_equivalents(effect.identifier)
+        assert fx.rare((effect.identifier, "delay")) == 1 and not fx.rare((effect.rarer_than,))
+
+
 def test_near_equivalents_are_mutual_and_never_the_effect_itself() -> None:
     for effect in fx.CATALOGUE:
         for other in fx.near_equivalents(effect.identifier):
