@@ -3,14 +3,8 @@
 No model of a real rig leaves noise alone. So the weight of a cell of the evidence is not that of
 noise: it is estimated from what the fit leaves on the fitted parts, and the fit is repeated with it
 (iteratively reweighted least squares, the maximum-likelihood estimate for unknown variances by
-cell). Models are compared by the log-likelihood of parts that no fit has seen.
-
-Noise is another number on every line. What a remainder leaves on the lines of one band need not
-be: friction that is a little other in this run, or a motor that stops a little beside its place,
-moves them all. Where one run fits and another selects, a band of a part counts for a few numbers
-only, else the fine lines of the fitted run outweigh an offset of all runs. Where one run does both,
-it counts for as many as its sums of squares say, which differ from part to part by sqrt(2/n) of
-their mean if n numbers are in them.
+cell). Models are compared by the log-likelihood of parts that no fit has seen. What a cell counts
+for is said in `cell_weights`.
 """
 
 from __future__ import annotations
@@ -26,6 +20,7 @@ from fjr_sim_node import effects as fx
 
 from ..model.evidence import Evidence
 from ..model.simulated_rig import Model
+from .cell_weights import CellWeights
 from .least_squares import Solution, solve
 from .ripples_of_records import RecordRipples
 from .ripples_seen import SeenRipples
@@ -40,8 +35,6 @@ _LEAST_PROMISE = 20.0  # a start that gains less than this (twice the nats) is n
 _STARTS = 2
 RIPPLES_TRIED = 3
 _RIVAL = 0.05  # an error: a second start that costs so much more than the first is not pursued
-_COHERENT = 4.0
-"""Independent numbers, at the least, that a remainder leaves in a band of a part."""
 _ACTS = (
     0.1  # of what is left in a band of a part: an effect that moves it by less does not act there
 )
@@ -79,6 +72,7 @@ class CellFitter:
         evidence: the records.
         nominal: datasheet values of the base parameters.
         tolerance: how far one may be off, relative.
+        weights: of the errors of its fits.
         fit_parts, select_parts: indices of parts.
         groups: (errors,), the stretch of time of each error of the fit, by its first part.
         runs: (errors,), the record of each error of the fit.
@@ -87,36 +81,10 @@ class CellFitter:
     def __init__(self, evidence: Evidence, nominal: Mapping[str, float], tolerance: float) -> None:
         """Prepare."""
         self.evidence, self.nominal, self.tolerance = evidence, dict(nominal), tolerance
-        self.fit_parts = evidence.parts_for("fit")
-        self.select_parts = evidence.parts_for("select") or self.fit_parts
         self._rippled: tuple[CellFit, tuple[RecordRipples, SeenRipples]] | None = None
-        self._cell = evidence.cell_of(self.fit_parts)
-        self._count = np.bincount(self._cell, minlength=evidence.cells)
-        levels = [evidence.records.levels.index(evidence.parts[p].level) for p in self.fit_parts]
-        self._fit_parts_of = np.bincount(levels, minlength=len(evidence.records.levels))
-        runs = [r.level for r in evidence.records.records]
-        self._alone = np.array([runs.count(level) == 1 for level in evidence.records.levels])
-        self._coherent = np.full((len(evidence.records.levels), evidence.bands), _COHERENT)
-        self._noise = evidence.noise.std_rad**2 if evidence.noise.known else 0.0
-        self._floor = evidence.floor(self.fit_parts)
-        self.groups = evidence.stretch_of(self.fit_parts)
-        of_part = np.array([part.record for part in evidence.parts])
-        self.runs = of_part[evidence.part_of(self.fit_parts)]
-        evidence = self.evidence
-        bands = evidence.cell_of(self.select_parts) % evidence.bands
-        place = {part: k for k, part in enumerate(self.select_parts)}
-        of_part = np.array([place[p] for p in evidence.part_of(self.select_parts)])
-        self._select_bins = of_part * evidence.bands + bands
-        shape = len(self.select_parts), evidence.bands
-        self._counts = np.bincount(self._select_bins, minlength=shape[0] * shape[1]).reshape(shape)
-        levels = [evidence.records.levels.index(evidence.parts[p].level) for p in self.select_parts]
-        self._select_levels = np.array(levels)
-        self._select_floor = self._floor.reshape(-1, evidence.bands)[levels]
-        self._select_cell = evidence.cell_of(self.select_parts)
-        select_run = np.array([p.record for p in evidence.parts])[
-            evidence.part_of(self.select_parts)
-        ]
-        self._unseen = [select_run == run for run in np.setdiff1d(select_run, self.runs)]
+        self.weights = CellWeights(evidence)
+        self.fit_parts, self.select_parts = self.weights.fit_parts, self.weights.select_parts
+        self.groups, self.runs = evidence.stretch_of(self.fit_parts), self.weights.runs
         records = evidence.records
         self.scales = Scales.of_record(
             [r.position for r in records.records],
@@ -131,34 +99,9 @@ class CellFitter:
         space = Space(self.nominal, (), (), self.tolerance, self.scales)
         start = space.point(Model(self.nominal, {}))
         errors = self.evidence.errors([space.model(start)], self.fit_parts)[0]
-        first = self._reweighted((), space, start, self._variance(errors), _REFIT_ROUNDS)
-        if not self._alone.any():
-            return first
-        self._coherent = self._coherence(first.solution.residuals / self.weight(first.variance))
-        return self.further(first)
-
-    def _coherence(self, errors: np.ndarray) -> np.ndarray:
-        """Return how many independent numbers are left in each band of a part of each level.
-
-        Args:
-            errors: on the fitted parts, (errors,), rad.
-
-        Returns:
-            (levels, bands), at least `_COHERENT`; that, where a level has several runs.
-        """
-        shape = self._coherent.shape
-        part, band = self.evidence.part_of(self.fit_parts), self._cell % shape[1]
-        bins = len(self.evidence.parts), shape[1]
-        place = part * bins[1] + band
-        squares = np.bincount(place, errors**2, bins[0] * bins[1]).reshape(bins)
-        level = np.array([self.evidence.records.levels.index(p.level) for p in self.evidence.parts])
-        found = np.full(shape, _COHERENT)
-        for k in range(shape[0]):
-            own = squares[[p for p in self.fit_parts if level[p] == k]]
-            if self._alone[k] and len(own) > 2:
-                spread = own.var(axis=0, ddof=1)
-                found[k] = 2.0 * own.mean(axis=0) ** 2 / np.maximum(spread, 1e-300)
-        return np.maximum(found, _COHERENT)
+        first = self._reweighted((), space, start, self.weights.variance(errors), _REFIT_ROUNDS)
+        left = first.solution.residuals / self.weights.weight(first.variance)
+        return self.further(first) if self.weights.learn(left) else first
 
     def screening(self, parent: CellFit, effect: str) -> Screening:
         """Return what the starts of an effect promise beside a fit."""
@@ -176,7 +119,7 @@ class CellFitter:
             [*starts(effect, self.scales, cycles, self.nominal), *seen],
             partial(self._space, parent),
             partial(self._residuals, parent.variance),
-            partial(self._costs, parent.variance),
+            partial(self.weights.costs, parent.variance),
         )
 
     def promise(self, screened: Screening, before: CellFit, parent: CellFit) -> float:
@@ -187,16 +130,16 @@ class CellFitter:
             before: the fit beside which it was screened.
             parent: the fit beside which it may be added.
         """
-        ratio = self.weight(parent.variance) / self.weight(before.variance)
-        costs = partial(self._costs, parent.variance)
+        ratio = self.weights.weight(parent.variance) / self.weights.weight(before.variance)
+        costs = partial(self.weights.costs, parent.variance)
         return screened.gain_beside(parent.solution, ratio, costs)
 
     def add(self, parent: CellFit, effect: str, proposals: Sequence[Proposal]) -> CellFit | None:
         """Fit a parent's explanation with one effect more; None if no start promises anything."""
         best: CellFit | None = None
         kept: list[Space] = []
-        begun = float(self._costs(parent.variance, parent.solution.residuals[None])[0])
-        numbers = self._numbers(parent.variance).sum()
+        begun = float(self.weights.costs(parent.variance, parent.solution.residuals[None])[0])
+        numbers = self.weights.numbers(parent.variance).sum()
         rival = proposals[0][0] + _RIVAL * numbers if proposals else begun
         for cost, space, point in proposals:
             if cost > min(begun - _LEAST_PROMISE, rival) or len(kept) == _STARTS:
@@ -232,7 +175,7 @@ class CellFitter:
         rest = {n: v for n, v in fit.model.effects.items() if not n.startswith(f"{effect}.")}
         models = [fit.model, Model(fit.model.plant, rest)]
         errors = self.evidence.errors(models, self.select_parts)
-        moved = self._mean_squares(errors[1] - errors[0])
+        moved = self.weights.mean_squares(errors[1] - errors[0])
         return np.any(moved >= _ACTS * fit.left, axis=1)
 
     def without(self, fit: CellFit, effect: str) -> CellFit:
@@ -249,7 +192,7 @@ class CellFitter:
         start = space.point(fit.model)
         rest = tuple(e for e in fit.effects if e != effect)
         errors = self.evidence.errors([space.model(start)], self.fit_parts)[0]
-        return self._reweighted(rest, space, start, self._variance(errors), _REFIT_ROUNDS)
+        return self._reweighted(rest, space, start, self.weights.variance(errors), _REFIT_ROUNDS)
 
     def fall(self, fit: CellFit, without: CellFit) -> float:
         """Return by how much twice the negative log-likelihood of the fitted parts falls.
@@ -259,7 +202,7 @@ class CellFitter:
             without: the fit that lacks it.
         """
         ratio = np.log(without.variance / fit.variance)
-        return max(float(self._numbers(fit.variance) @ ratio), 0.0)
+        return max(float(self.weights.numbers(fit.variance) @ ratio), 0.0)
 
     def misfit(self, fit: CellFit) -> float:
         """Return what a fit leaves on unseen parts over noise and the simulation's own error.
@@ -268,8 +211,8 @@ class CellFitter:
         """
         if not self.evidence.noise.known:
             return math.nan
-        relative = fit.left / self._select_floor - 1.0
-        return float(np.sum(self._counts * relative) / self._counts.sum())
+        relative = fit.left / self.weights.select_floor - 1.0
+        return float(np.sum(self.weights.counts * relative) / self.weights.counts.sum())
 
     def gains(self, after: CellFit, before: CellFit) -> np.ndarray:
         """Return the log-likelihood that one fit gains over another on each part that selects.
@@ -281,11 +224,11 @@ class CellFitter:
         Returns:
             (parts,), nats.
         """
-        return self._gains(after, before).sum(axis=1)
+        return self.weights.gained(after.left, before.left).sum(axis=1)
 
     def left_of(self, after: CellFit, before: CellFit) -> float:
         """Return how much of the squared error on unseen parts one fit leaves of another's."""
-        left = [float(np.sum(self._counts * fit.left)) for fit in (after, before)]
+        left = [float(np.sum(self.weights.counts * fit.left)) for fit in (after, before)]
         return left[0] / left[1]
 
     def closed(self, after: CellFit, before: CellFit) -> float:
@@ -294,48 +237,20 @@ class CellFitter:
         The band is the one in which it gains most log-likelihood: a delay shows at high
         frequencies, where little of the motion is.
         """
-        left = [np.sum(self._counts * fit.left, axis=0) for fit in (before, after)]
-        most = int(np.argmax(self._gains(after, before).sum(axis=0)))
+        left = [np.sum(self.weights.counts * fit.left, axis=0) for fit in (before, after)]
+        most = int(np.argmax(self.weights.gained(after.left, before.left).sum(axis=0)))
         return float(1.0 - left[1][most] / left[0][most])
 
-    def _gains(self, after: CellFit, before: CellFit) -> np.ndarray:
-        """Return the log-likelihood gained in each band of each part, (parts, bands), nats."""
-        noise = np.minimum(self._noise / np.minimum(before.left, after.left), 1.0)
-        coherent = np.minimum(self._coherent[self._select_levels], self._counts)
-        numbers = _independent(noise, self._counts, coherent)
-        return 0.5 * numbers * np.log(before.left / after.left)
-
-    def _numbers(self, variance: np.ndarray) -> np.ndarray:
-        """Return how many independent numbers each cell holds on the fitted parts, (cells,)."""
-        noise = np.minimum(self._noise / variance, 1.0)
-        coherent = (self._fit_parts_of[:, None] * self._coherent).ravel()
-        return _independent(noise, self._count, np.minimum(coherent, self._count))
-
-    def weight(self, variance: np.ndarray) -> np.ndarray:
-        """Return the weight of each error of the fit, (errors,), 1/rad.
-
-        Args:
-            variance: (cells,), of an error in each cell, rad2.
-        """
-        share = self._numbers(variance) / np.maximum(self._count, 1)
-        return np.sqrt(share / variance)[self._cell]
-
     def _left(self, model: Model, variance: np.ndarray) -> np.ndarray:
-        parts = self.select_parts
-        others = deviated(model) if self._unseen else []
-        errors = self.evidence.errors([model, *others], parts)
-        share = self._numbers(variance) / np.maximum(self._count, 1)
-        weight = np.sqrt(share / variance)[self._select_cell]
-        return self._mean_squares(beside_scatter(errors, weight, self._unseen)) + self._select_floor
-
-    def _mean_squares(self, values: np.ndarray) -> np.ndarray:
-        """Return the mean square of numbers on the parts that select, (parts, bands)."""
-        squares = np.bincount(self._select_bins, values**2, self._counts.size)
-        return squares.reshape(self._counts.shape) / self._counts
+        others = deviated(model) if self.weights.unseen else []
+        errors = self.evidence.errors([model, *others], self.select_parts)
+        weight = self.weights.select_weight(variance)
+        alone = beside_scatter(errors, weight, self.weights.unseen)
+        return self.weights.mean_squares(alone) + self.weights.select_floor
 
     def _ripples(self, parent: CellFit) -> tuple[RecordRipples, SeenRipples]:
         if self._rippled is None or self._rippled[0] is not parent:
-            weight, solution = self.weight(parent.variance), parent.solution
+            weight, solution = self.weights.weight(parent.variance), parent.solution
             at = self.evidence, self.fit_parts, parent.model
             self._rippled = parent, (RecordRipples(*at, weight, solution), SeenRipples(*at))
         return self._rippled[1]
@@ -349,30 +264,7 @@ class CellFitter:
         )
 
     def _residuals(self, variance: np.ndarray, models: Sequence[Model]) -> np.ndarray:
-        return self.evidence.errors(models, self.fit_parts) * self.weight(variance)
-
-    def _costs(self, variance: np.ndarray, errors: np.ndarray) -> np.ndarray:
-        """Return twice the negative log-likelihood of errors whose variances by cell are unknown.
-
-        Zero for the fit whose variances are given, but where noise alone is left. An offset is one
-        line of many: a sum of squares in these variances would hardly see that it is gone.
-
-        Args:
-            variance: (cells,), rad2.
-            errors: (models, errors), times its `weight`.
-
-        Returns:
-            (models,).
-        """
-        cells, least = self.evidence.cells, self._floor / variance
-        numbers = self._numbers(variance)
-        squares = np.array([np.bincount(self._cell, row**2, cells) for row in errors])
-        mean = np.maximum(squares / np.maximum(numbers, 1e-9), least)
-        return np.log(mean) @ numbers
-
-    def _variance(self, errors: np.ndarray) -> np.ndarray:
-        found = self.evidence.mean_squares(errors, self.fit_parts)
-        return np.maximum(found, self._floor)
+        return self.evidence.errors(models, self.fit_parts) * self.weights.weight(variance)
 
     def _reweighted(
         self,
@@ -390,24 +282,12 @@ class CellFitter:
                 return self._residuals(variance, [space.model(point) for point in points])
 
             solution = solve(residuals, x, *space.bounds(), most_steps=steps, known=known)
-            before = self.weight(variance)
+            before = self.weights.weight(variance)
             errors = solution.residuals / before
-            variance, x = self._variance(errors), solution.x
-            known = solution.jacobian * (self.weight(variance) / before)[:, None]
+            variance, x = self.weights.variance(errors), solution.x
+            known = solution.jacobian * (self.weights.weight(variance) / before)[:, None]
         assert solution is not None and known is not None
-        left = errors * self.weight(variance)
+        left = errors * self.weights.weight(variance)
         ended = replace(solution, residuals=left, jacobian=known, cost=float(left @ left))
         model = space.model(x)
         return CellFit(effects, space, model, ended, variance, self._left(model, variance))
-
-
-def _independent(noise: np.ndarray, lines: np.ndarray, coherent: np.ndarray) -> np.ndarray:
-    """Return how many independent numbers a sum of squares holds (Satterthwaite 1946).
-
-    Args:
-        noise: share of noise in it, which is independent on every line; the rest is a remainder's.
-        lines: number of lines.
-        coherent: number of independent numbers of the remainder.
-    """
-    found = 1.0 / (noise**2 / np.maximum(lines, 1) + (1.0 - noise) ** 2 / np.maximum(coherent, 1))
-    return np.where(lines > 0, found, 0.0)

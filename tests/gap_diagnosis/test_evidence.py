@@ -21,7 +21,8 @@ from gap_diagnosis.model.simulated_rig import Model
 from gap_diagnosis.notes import at_limits
 from gap_diagnosis.outcome.diagnosis import Figure
 from gap_diagnosis.which import unseen_friction
-from gap_diagnosis.which.cell_fits import CellFitter, _independent
+from gap_diagnosis.which.cell_fits import CellFitter
+from gap_diagnosis.which.cell_weights import independent
 from gap_diagnosis.which.presence import at_its_bound, beyond_zero, cell_estimates, invariance
 from gap_diagnosis.which.stepwise import Gain, Stepwise, gain
 
@@ -255,7 +256,7 @@ def test_noise_counts_line_by_line_and_a_remainder_as_a_few_numbers():
         rest = np.sqrt(1.0 - share) * rng.standard_normal((draws, modes)) @ basis.T
         squares = np.mean((noise + rest) ** 2, axis=1)
         seen = 2.0 * np.mean(squares) ** 2 / np.var(squares)
-        said = _independent(np.array(share), np.array(lines), np.array(modes))
+        said = independent(np.array(share), np.array(lines), np.array(modes))
         assert said == pytest.approx(seen, rel=0.25)
 
 
@@ -274,10 +275,10 @@ def test_lines_of_a_single_run_count_as_its_parts_differ():
     one, three = (
         CellFitter(Evidence(records(runs=runs), NOMINAL), NOMINAL, 0.1) for runs in (1, 3)
     )
-    noise = rng.standard_normal(one._cell.size)
-    lines = one._counts[0]
-    seen = one._coherence(noise).mean(axis=0)[2:] / lines[2:]
+    noise = rng.standard_normal(one.runs.size)
+    lines = one.weights.counts[0]
+    seen = one.weights.coherence(noise).mean(axis=0)[2:] / lines[2:]
     assert seen == pytest.approx(np.ones(seen.size), rel=0.7)
     factor = rng.standard_normal(len(one.evidence.parts))[one.evidence.part_of(one.fit_parts)]
-    assert np.unique(one._coherence(factor)) == [4.0]
-    assert np.unique(three._coherence(rng.standard_normal(three._cell.size))) == [4.0]
+    assert np.unique(one.weights.coherence(factor)) == [4.0]
+    assert np.unique(three.weights.coherence(rng.standard_normal(three.runs.size))) == [4.0]

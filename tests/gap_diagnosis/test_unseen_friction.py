@@ -64,7 +64,7 @@ def test_only_runs_that_no_fit_has_seen_are_given_a_friction_of_their_own(runs):
     fitter = CellFitter(Evidence(records(runs=runs, seconds=5.0), NOMINAL), NOMINAL, 0.1)
     seen = {fitter.evidence.parts[p].record for p in fitter.fit_parts}
     unseen = {fitter.evidence.parts[p].record for p in fitter.select_parts} - seen
-    assert len(fitter._unseen) == len(unseen) == (0 if runs == 1 else 2)
+    assert len(fitter.weights.unseen) == len(unseen) == (0 if runs == 1 else 2)
 
 
 def test_a_small_offset_is_there_on_runs_whose_friction_differs(monkeypatch):
