@@ -38,6 +38,9 @@ def cell_estimates(
 ) -> dict[str, Estimate]:
     """Return all free parameters with their 95 % intervals, cut at their bounds.
 
+    A size that the shape of an only effect blurs is kept from zero by its profile; of several
+    effects one may blur the other, and then it is not known which of them is there.
+
     Args:
         fit: an explanation.
         fitter: that made it.
@@ -47,8 +50,9 @@ def cell_estimates(
     std = standard_errors(fit.solution.jacobian, fit.solution.residuals, fitter.groups)
     moved = moved_by_scatter(fit, fitter.runs, scatter)
     linear = linear_estimates(fit, np.sqrt(std**2 + moved**2 + form(fit, FORM_BESIDE) ** 2))
-    fallen = {effect: fitter.fall(fit, other) for effect, other in without.items()}
-    return kept_from_zero(linear, fallen)
+    if len(fit.effects) > 1:
+        return linear
+    return kept_from_zero(linear, {e: fitter.fall(fit, other) for e, other in without.items()})
 
 
 def beyond_zero(effect: str, found: Mapping[str, Estimate], fall: float) -> bool:
@@ -65,7 +69,9 @@ def beyond_zero(effect: str, found: Mapping[str, Estimate], fall: float) -> bool
     sizes = [name for name in fx.EFFECTS[effect].size_names if name in found]
     for name in sizes:
         estimate, off = found[name], float(fx.parameter(name).default)
-        if math.isinf(off) or not estimate.low <= off <= estimate.high:
+        if math.isinf(off):  # a limit, whose inverse is a size
+            off = 0.0
+        if not estimate.low <= off <= estimate.high:
             return True
     return len(sizes) > 1 and together_sure(fall, len(sizes))
 

@@ -10,8 +10,10 @@ from test_evidence import NOMINAL, SCATTER, records
 
 from gap_diagnosis import record_judgement
 from gap_diagnosis.model.evidence import Evidence
+from gap_diagnosis.outcome.diagnosis import Estimate
 from gap_diagnosis.record_investigation import SURE, _guesses, _kept, _one_by_one
 from gap_diagnosis.which.cell_fits import CellFitter
+from gap_diagnosis.which.presence import beyond_zero
 from gap_diagnosis.which.stepwise import Found, Gain
 
 CAUSES = {"torque_bias.torque_nm": 4.0, "delay.time_s": 1e-3}
@@ -68,3 +70,16 @@ def test_a_third_cause_must_be_sure(searched):
 def replace_share(share):
     """Return a share that is small and certain."""
     return share.model_copy(update={"value": 0.02, "low": 0.01, "high": 0.03})
+
+
+@pytest.mark.parametrize(("low", "there"), [(0.0, False), (20.0, True)])
+def test_a_limit_is_known_where_its_inverse_is_not_zero(low, there):
+    limit = {"torque_saturation.limit_nm": Estimate(value=30.0, low=low, high=60.0 - low)}
+    assert beyond_zero("torque_saturation", limit, 0.0) == there
+
+
+@pytest.mark.parametrize(("fall", "there"), [(5.0, False), (7.0, True)])
+def test_several_sizes_are_known_together_where_none_is_alone(fall, there):
+    names = ("quadratic_friction.motor_nm_s2_rad2", "quadratic_friction.link_nm_s2_rad2")
+    blurred = {name: Estimate(value=1.0, low=-1.0, high=3.0) for name in names}
+    assert beyond_zero("quadratic_friction", blurred, fall) == there
