@@ -48,7 +48,8 @@ class TopicSurvey:
         regular: whether most steps are near the nominal one.
         jitter_s: rms of the deviations of the steps near the nominal one from it; None without any.
         worst_jitter_s: the greatest of these deviations.
-        lost: messages that are missing in gaps of the stamps; None where the steps are not regular.
+        lost: messages that are missing in gaps of the stamps; None where the steps are not regular,
+            or messages have no stamps.
         longest_gap_s: longest step from one stamp to the next.
         duplicates: messages with the stamp of the one before.
         backward: messages with an earlier stamp than the one before.
@@ -221,7 +222,9 @@ class _Followed:
         problems = [*self._problems]
         if self._messages != expected:
             problems.append(f"{self._messages} messages are there where the bag says {expected}")
-        if regular and self._lost:
+        # Without stamps there is the time of arrival, which a busy machine delays: no loss is told.
+        counted = regular and self._stamped
+        if counted and self._lost:
             problems.append(f"{_count(self._lost, 'message')} missing between the others")
         if self._duplicates:
             problems.append(f"{_count(self._duplicates, 'stamp')} there twice")
@@ -236,7 +239,7 @@ class _Followed:
             regular=regular,
             jitter_s=(self._squares_ns2 / near) ** 0.5 * 1e-9 if near else None,
             worst_jitter_s=self._worst_ns * 1e-9 if near else None,
-            lost=self._lost if regular else None,
+            lost=self._lost if counted else None,
             longest_gap_s=self._longest_ns * 1e-9 if self._longest_ns else None,
             duplicates=self._duplicates,
             backward=self._backward,

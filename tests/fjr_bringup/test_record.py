@@ -115,7 +115,7 @@ def test_topics_of_another_rig_are_recorded_with_their_qos(start, peer, tmp_path
         loads.publish(Float64(data=float(k)))
     assert loads.wait_for_all_acked(Duration(seconds=30))
     peer.spin_until(lambda: (bag.parent / ".bag.partial").exists(), "the bag")
-    assert recorder.interrupt() == 0
+    assert recorder.interrupt() == 0, recorder.output
     assert recorder.output.splitlines()[-1] == str(bag)
     by_name = {topic.name: topic for topic in survey_bag(bag).topics}
     assert by_name["/load"].messages == 100 and not by_name["/load"].stamped

@@ -93,11 +93,12 @@ def test_messages_without_a_stamp_go_by_the_times_of_recording(tmp_path):
     payload = bytes(STORE.serialize_cdr(STORE.types[kind](1.5), kind))
     streams = {
         **rig_streams(dict.fromkeys("ryu", WHOLE)),
-        "/load": [(k * 10 * MS, payload) for k in WHOLE],
+        "/load": [(k * 10 * MS, payload) for k in WHOLE if k != 30],
     }
     survey = survey_bag(foreign_bag(tmp_path / "bag", streams, types={"/load": kind}))
     load = next(topic for topic in survey.topics if topic.name == "/load")
-    assert (load.stamped, load.rate_hz, load.lost) == (False, 100.0, 0)
+    assert (load.stamped, load.rate_hz, load.lost) == (False, 100.0, None)
+    assert not load.problems  # a busy machine makes such gaps too
 
 
 def test_more_blocks_than_the_first_go_on_where_it_ended(tmp_path):
