@@ -14,6 +14,7 @@ SCRIPTS = (
     "bag_reading",
     "analysis",
     "parametric_fit",
+    "diagnosis",
     "waiting",
     "ros_graph",
 )
