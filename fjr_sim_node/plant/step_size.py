@@ -83,9 +83,14 @@ def reach_within_energy(s, link, motor, duration, p, e):
 def fastest_rate(twist, s, torque, p, e):
     """Return in rad/s how fast the motion may oscillate or decay up to a deflection.
 
-    The squared frequency is bounded by the sum over all springs of stiffness times mobility.
+    The squared frequency is bounded by the sum over all springs of stiffness times mobility. A
+    spring whose cubic part outweighs the linear one is counted up to twice, since its stiffness
+    itself goes from nearly nothing to the greatest within a quarter of a swing.
     """
-    stiffness = p[K0] + 3.0 * p[K1] * twist * twist
+    hardened = 3.0 * p[K1] * twist * twist
+    stiffness = p[K0] + hardened
+    if hardened > p[K0]:
+        stiffness += hardened - p[K0]
     decay = p[FV] / p[J] + p[FVM] / p[JM]
     if e is None:
         return math.sqrt(stiffness * (1.0 / p[J] + 1.0 / p[JM])) + decay

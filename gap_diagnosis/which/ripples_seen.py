@@ -21,7 +21,7 @@ _PER_CROSSOVER = 8.0  # averages in a period of the observer's crossover
 _FASTEST = 1.0  # ripples of a higher frequency, over the crossover, the observer does not follow
 _REST = 0.03  # of the rms velocity: below, friction is whatever holds
 _PEAKS = 2
-_NEARLY, _ALIKE = 0.95, 4
+_NEARLY, _ALIKE = 0.95, 4  # of the best; how many of those that explain so much
 
 
 class SeenRipples:
