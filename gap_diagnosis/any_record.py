@@ -17,6 +17,7 @@ from fjr_records.periodic import RecordedExperiment, read_experiment
 from fjr_records.records import RecordSet, read_records, reference_optional
 
 from .investigation import Investigation, investigate
+from .notes import NOT_HELD_OUT
 from .outcome.diagnosis import Diagnosis
 from .record_investigation import RecordInvestigation, investigate_records
 from .which.search_space import TOLERANCE
@@ -28,6 +29,10 @@ STEADY_SHARE = 0.5
 BESIDE = (
     "No explanation of the steady periods leaves noise alone, so the whole runs were searched for "
     "causes beside a remainder."
+)
+UNTESTED = (
+    "Each level has a single run, so no run could be held out of a comparison by steady periods. "
+    "The whole runs were searched instead, block by block, some of which no fit has seen."
 )
 UNSTEADY = (
     "The periods do not repeat as steady ones do, so the whole runs were searched for causes "
@@ -125,7 +130,8 @@ def investigate_any(
     Steady periods are compared period by period, which shows the least effects. Where no
     explanation leaves noise alone, their runs are searched as records for causes beside a
     remainder; so are those of periods that do not repeat, whose verdict stays where nothing is
-    found.
+    found. An effect that steady periods would name is looked for in whole runs, too, where no run
+    was held out: nothing is named that nothing has tested.
     """
     begun = time.monotonic()
     if isinstance(recorded, RecordedExperiment):
@@ -134,7 +140,8 @@ def investigate_any(
             budget_s=STEADY_SHARE * budget_s, progress=progress,
         )  # fmt: skip
         unsteady = steady.gates.only_unsteady
-        if steady.diagnosis.verdict != "unexplained" and not unsteady:
+        untested = bool(steady.diagnosis.effects) and steady.diagnosis.reported_on == "none"
+        if steady.diagnosis.verdict != "unexplained" and not unsteady and not untested:
             return steady
         left = max(budget_s - (time.monotonic() - begun), 0.0)
         whole = investigate_records(
@@ -143,7 +150,7 @@ def investigate_any(
         )  # fmt: skip
         if unsteady and not whole.diagnosis.causes:
             return steady
-        return _beside(whole, steady, UNSTEADY if unsteady else BESIDE)
+        return _beside(whole, steady, UNSTEADY if unsteady else UNTESTED if untested else BESIDE)
     return investigate_records(
         recorded, nominal, tolerance=tolerance, effects=effects, budget_s=budget_s,
         progress=progress,
@@ -153,10 +160,11 @@ def investigate_any(
 def _beside(whole: RecordInvestigation, steady: Investigation, why: str) -> RecordInvestigation:
     """Return what was found beside a remainder, with what only steady periods tell."""
     known = steady.diagnosis
+    notes = [note for note in known.notes if note != NOT_HELD_OUT]
     told = whole.diagnosis.model_copy(
         update={
             "bags": known.bags or whole.diagnosis.bags,
-            "notes": [why, *_once(known.notes, whole.diagnosis.notes)],
+            "notes": [why, *_once(notes, whole.diagnosis.notes)],
         }
     )
     return replace(whole, diagnosis=told)

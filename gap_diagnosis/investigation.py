@@ -112,6 +112,7 @@ def investigate(
     if gates.hint == "bad_data":
         diagnosis = stopped("bad_data", gates)
         return Investigation(recorded, model, gates, noise, held, {}, {}, None, diagnosis)
+    simulator.begin_near(model)
     std, step = _noise_std(recorded, noise), position_step(recorded)
     seen = std if step is None else widened(std, step, recorded.experiment.samples_per_period)
     fitter = Fitter(recorded, simulator, seen, model.plant, train, held, tolerance, effects)

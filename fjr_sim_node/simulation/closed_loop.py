@@ -26,6 +26,34 @@ _BODIES = 6  # a rig's state begins with positions and velocities of link, motor
 
 
 @dataclass(frozen=True)
+class State:
+    """State of a loop before a sample.
+
+    Attributes:
+        rig: as `rig.at_rest`.
+        law: that of the control law, float64 (states + 1,); a step uses the last one for itself.
+    """
+
+    rig: np.ndarray
+    law: np.ndarray
+
+    @classmethod
+    def at_rest(cls, controller: Law, elapsed_s: float = 0.0) -> State:
+        """Return the state of a loop that has not moved yet.
+
+        Args:
+            controller: from `law.law_of`.
+            elapsed_s: time since the rig was switched on, for what drifts.
+        """
+        states = controller.states if isinstance(controller, TransferFunction) else 1
+        return cls(rig.at_rest(elapsed_s), np.zeros(states + 1))
+
+    def copied(self) -> State:
+        """Return one that a simulation may change."""
+        return State(self.rig.copy(), self.law.copy())
+
+
+@dataclass(frozen=True)
 class Trajectory:
     """Sampled signals of a simulation, float64 of shape (samples,) each.
 
@@ -35,6 +63,7 @@ class Trajectory:
         torque: u (N m).
         link: q, link position (rad).
         motor: th, true motor position (rad).
+        end: state of the loop after the last sample.
     """
 
     reference: np.ndarray
@@ -42,6 +71,7 @@ class Trajectory:
     torque: np.ndarray
     link: np.ndarray
     motor: np.ndarray
+    end: State
 
     def recorded(self, signals: Sequence[Signal]) -> dict[str, np.ndarray]:
         """Return the samples of signals by their symbols, as a bag takes them."""
@@ -51,11 +81,10 @@ class Trajectory:
 
 
 @jit
-def _run(reference, noise, sample_period, p, e, c, state, position, torque, link, motor):
-    x = 0.0
+def _run(reference, noise, sample_period, p, e, c, x, state, position, torque, link, motor):
     for k in range(reference.size):
         y = rig.measure(state, noise[k], e)
-        x, u = pd_filtered.step(x, reference[k] - y, c)
+        x[0], u = pd_filtered.step(x[0], reference[k] - y, c)
         position[k], torque[k], link[k], motor[k] = y, u, state[rig.LINK], state[rig.MOTOR]
         rig.hold(state, u, sample_period, p, e)
 
@@ -82,8 +111,9 @@ def simulate(
     noise: np.ndarray | None = None,
     effects: np.ndarray | None = None,
     elapsed_s: float = 0.0,
+    begin: State | None = None,
 ) -> Trajectory:
-    """Simulate the closed loop from rest.
+    """Simulate the closed loop from rest, or from a state of it.
 
     Args:
         reference: r, float64 of shape (samples,) in rad.
@@ -93,15 +123,17 @@ def simulate(
         noise: encoder noise in rad, of shape (samples,); None for none.
         effects: from `effects.coefficients`; None for the bare plant.
         elapsed_s: time since the rig was switched on, for what drifts.
+        begin: where the simulation begins, with its own elapsed time; None for rest.
 
     Raises:
         InputError: the motion diverged.
     """
+    begin = begin or State.at_rest(controller, elapsed_s)
     if isinstance(controller, TransferFunction):
         return simulate_law(
-            reference, sample_rate_hz, plant_coefficients, controller, noise, effects, elapsed_s
+            reference, sample_rate_hz, plant_coefficients, controller, noise, effects, begin=begin
         )
-    reference, noise, out = _prepared(reference, noise)
+    reference, noise, out = _prepared(reference, noise, begin)
     _run(
         reference,
         noise,
@@ -109,7 +141,8 @@ def simulate(
         plant_coefficients,
         effects,
         controller,
-        rig.at_rest(elapsed_s),
+        out.end.law,
+        out.end.rig,
         out.position,
         out.torque,
         out.link,
@@ -130,6 +163,7 @@ def simulate_law(
     added_torque: np.ndarray | None = None,
     start: tuple[float, float] = (0.0, 0.0),
     controller_state: np.ndarray | None = None,
+    begin: State | None = None,
     substeps: int = 1,
 ) -> Trajectory:
     """Simulate the loop of any linear law, from any start; see `simulate`.
@@ -146,20 +180,23 @@ def simulate_law(
         start: position (rad) and velocity (rad/s) of all bodies at the first sample.
         controller_state: state of the law before it, such as the `entering_state` of a record;
             None for zero.
+        begin: where the simulation begins, whatever the three say; None for what they say.
         substeps: parts of a sample in which the plant is integrated, at least.
 
     Raises:
         InputError: the motion diverged, or signals or state have another length than they must.
     """
-    reference, noise, out = _prepared(reference, noise)
+    if begin is None:
+        begin = State.at_rest(controller, elapsed_s)
+        begin.rig[:_BODIES] = start * (_BODIES // 2)
+        if controller_state is not None:
+            begin.law[:-1] = _of_length(
+                controller_state, controller.states, "controller_state", "states"
+            )
+    reference, noise, out = _prepared(reference, noise, begin)
     added = np.zeros(reference.size)
     if added_torque is not None:
         added = _of_length(added_torque, reference.size, "added_torque", "samples")
-    x = np.zeros(controller.states + 1)
-    if controller_state is not None:
-        x[:-1] = _of_length(controller_state, controller.states, "controller_state", "states")
-    state = rig.at_rest(elapsed_s)
-    state[:_BODIES] = start * (_BODIES // 2)
     _run_law(
         reference,
         added,
@@ -168,9 +205,9 @@ def simulate_law(
         substeps,
         plant_coefficients,
         effects,
-        x,
+        out.end.law,
         controller.coefficients,
-        state,
+        out.end.rig,
         out.position,
         out.torque,
         out.link,
@@ -180,14 +217,15 @@ def simulate_law(
 
 
 def _prepared(
-    reference: np.ndarray, noise: np.ndarray | None
+    reference: np.ndarray, noise: np.ndarray | None, begin: State
 ) -> tuple[np.ndarray, np.ndarray, Trajectory]:
-    """Return reference and noise as the kernels take them, and room for the signals."""
+    """Return reference and noise as the kernels take them, and room for signals and state."""
     reference = np.ascontiguousarray(reference, float)
     if noise is None:
         noise = np.zeros(reference.size)
     noise = _of_length(noise, reference.size, "noise", "samples")
-    return reference, noise, Trajectory(reference, *(np.empty(reference.size) for _ in range(4)))
+    y, u, q, th = (np.empty(reference.size) for _ in range(4))
+    return reference, noise, Trajectory(reference, y, u, q, th, begin.copied())
 
 
 def _of_length(values: np.ndarray, length: int, name: str, unit: str) -> np.ndarray:

@@ -17,6 +17,7 @@ from ..plant import advance, advance_with_effects
 LINK, MOTOR = 0, 2
 """Where link and motor position (rad) stand in a rig's state."""
 
+_EXTRA, _LAGGED = 4, 6
 _TIME, _SLEWED, _HEAD, _RING = 10, 11, 12, 13
 _RING_SIZE = 16_384  # samples of the longest delay: 100 ms at 20 kHz, each in eight parts
 _SLEW_PARTS = 8
@@ -32,6 +33,21 @@ def at_rest(elapsed_s: float = 0.0) -> np.ndarray:
     state = np.zeros(_RING + _RING_SIZE)
     state[_TIME] = elapsed_s
     return state
+
+
+def complete(state: np.ndarray, torque: float, elapsed_s: float) -> None:
+    """Set what effects remember in a state that a rig without them has reached.
+
+    Args:
+        state: of a rig in motion, changed in place: a third mass moves with the link, and lag,
+            slew limit and delay hold the torque.
+        torque: last command (N m).
+        elapsed_s: time since the rig was switched on, for what drifts.
+    """
+    state[_TIME] = elapsed_s
+    state[_EXTRA : _EXTRA + 2] = state[LINK : LINK + 2]
+    state[_LAGGED] = state[_SLEWED] = torque
+    state[_RING:] = torque
 
 
 @jit

@@ -7,7 +7,8 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from typing import Any
+from types import MappingProxyType
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -17,7 +18,8 @@ from fjr_records.noise import NoiseLevels, noise_levels
 from fjr_records.periodic import RecordedExperiment, RecordedRealization
 from fjr_sim_node import effects as fx
 from fjr_sim_node import plant
-from fjr_sim_node.simulation.closed_loop import Trajectory, simulate, simulate_law
+from fjr_sim_node.simulation import rig
+from fjr_sim_node.simulation.closed_loop import State, Trajectory, simulate, simulate_law
 
 from . import prediction
 
@@ -25,6 +27,9 @@ Signals = tuple[np.ndarray, np.ndarray]
 """One steady period of y (rad) and of u (N m) of every realization, float64 (n, N) each."""
 
 _MOST_STEPS, _MOST_STEPS_A_SAMPLE = 1e6, 20.0  # of the integration of one run
+_SETTLED = 1e-4  # of the rms position: what is left of a transient
+_SLOWER = 1.5  # times as long as it took the model that is simulated first
+_Result = TypeVar("_Result")
 _POOL = ThreadPoolExecutor(len(os.sched_getaffinity(0)))
 
 
@@ -83,7 +88,7 @@ class Model:
         return fx.coefficients(self.effects)
 
 
-def run_parallel(run: Callable[[Any], np.ndarray], jobs: Sequence[Any]) -> list[np.ndarray]:
+def run_parallel(run: Callable[[Any], _Result], jobs: Sequence[Any]) -> list[_Result]:
     """Return the results of jobs, run on all cores; the kernels release the interpreter lock."""
     return list(_POOL.map(run, jobs))
 
@@ -131,6 +136,9 @@ class Simulator:
     Where controller and references are known, the loop itself is repeated from rest, one period
     longer than the transient, and the last period is then periodic. Else the mean recorded period
     of u drives the model, held to that of y by an observer (`prediction`).
+
+    A model that is near to another one is sooner in its steady state from that one's than from
+    rest (`begin_near`).
     """
 
     def __init__(self, recorded: RecordedExperiment) -> None:
@@ -153,11 +161,42 @@ class Simulator:
             for r in recorded.realizations
         ]
         self._torques = [float(np.abs(r.torque).max()) for r in recorded.realizations]
+        self._begins: dict[int, tuple[int, State]] = {}
 
     @property
     def samples(self) -> int:
-        """How many samples of a realization are simulated."""
+        """How many samples of a realization are simulated from rest."""
         return self._periods * self._samples
+
+    def begin_near(self, model: Model) -> None:
+        """Let `many` begin in the steady state of a model, before the last period.
+
+        How long that is says the model's own way from rest: when its first period has come near
+        the last one.
+        """
+        every = range(len(self._inputs))
+        begins = run_parallel(lambda index: self._begin_near(model, index), every)
+        self._begins = {i: begin for i, begin in zip(every, begins, strict=True) if begin}
+
+    def _begin_near(self, model: Model, index: int) -> tuple[int, State] | None:
+        """Return from which sample on a realization has to be simulated, and the state before."""
+        inputs, elapsed = self._inputs[index], self._elapsed[index]
+        if self._stiff(model, index):
+            return None
+        try:
+            first = self._simulated(model, inputs, elapsed)
+            off = np.abs(first.position[: self._samples] - first.position[-self._samples :])
+            limit = _SETTLED * float(np.std(first.position[-self._samples :]))
+            settled = int(_SLOWER * np.flatnonzero(np.append(True, off > limit))[-1])
+            begin = self.samples - self._samples - settled
+            if begin <= 0:
+                return None
+            until = self._simulated(model, tuple(signal[:begin] for signal in inputs), elapsed)
+        except InputError:
+            return None
+        now = elapsed + begin / self.sample_rate_hz
+        rig.complete(until.end.rig, float(until.torque[-1]), now)
+        return begin, until.end
 
     def many(self, models: Sequence[Model], which: Sequence[int] | None = None) -> np.ndarray:
         """Return one steady period of the measured outputs for each model.
@@ -170,7 +209,7 @@ class Simulator:
             float64 (models, n, outputs, N) in rad; y, and q if the rig has a second encoder. A
             motion that diverges, or that would take too long to play, gives NaN.
         """
-        runs = self._run(models, which)
+        runs = self._run(models, which, self._begins)
         return runs[:, :, [0, 2][: self._outputs]]
 
     def signals(self, model: Model, which: Sequence[int] | None = None) -> Signals:
@@ -206,34 +245,47 @@ class Simulator:
         signals = (realization.position, realization.torque)
         return tuple(np.resize(realization.kept(s).mean(axis=0), self.samples) for s in signals)
 
-    def _run(self, models: Sequence[Model], which: Sequence[int] | None) -> np.ndarray:
+    def _run(
+        self,
+        models: Sequence[Model],
+        which: Sequence[int] | None,
+        begins: Mapping[int, tuple[int, State]] = MappingProxyType({}),
+    ) -> np.ndarray:
         """Return y, u and q, float64 (models, n, 3, N)."""
         indices = range(len(self._inputs)) if which is None else which
-        jobs = [(model, index) for model in models for index in indices]
+        jobs = [(model, index, begins.get(index)) for model in models for index in indices]
         out = np.array(run_parallel(self._one, jobs))
         return out.reshape(len(models), len(indices), 3, self._samples)
 
-    def _one(self, job: tuple[Model, int]) -> np.ndarray:
-        model, index = job
-        speed, torque = self._speeds[index], self._torques[index]
-        if too_stiff(model, self.samples, self.sample_rate_hz, speed, torque):
+    def _one(self, job: tuple[Model, int, tuple[int, State] | None]) -> np.ndarray:
+        model, index, (first, begin) = job[0], job[1], job[2] or (0, None)
+        if self._stiff(model, index):
             return np.full((3, self._samples), np.nan)
         try:
-            run = self._simulated(model, self._inputs[index], self._elapsed[index])
+            inputs = tuple(signal[first:] for signal in self._inputs[index])
+            run = self._simulated(model, inputs, self._elapsed[index], begin)
         except InputError:
             return np.full((3, self._samples), np.nan)
         return last_samples(model, run, self._samples)
 
+    def _stiff(self, model: Model, index: int) -> bool:
+        speed, torque = self._speeds[index], self._torques[index]
+        return too_stiff(model, self.samples, self.sample_rate_hz, speed, torque)
+
     def _simulated(
-        self, model: Model, inputs: tuple[np.ndarray, ...], elapsed_s: float
+        self,
+        model: Model,
+        inputs: tuple[np.ndarray, ...],
+        elapsed_s: float,
+        begin: State | None = None,
     ) -> Trajectory:
         p, e = model.plant_coefficients, model.effect_coefficients
         if self.repeats:
             (reference,) = inputs
-            return simulate(reference, self.sample_rate_hz, p, self._law, None, e, elapsed_s)
+            return simulate(reference, self.sample_rate_hz, p, self._law, None, e, elapsed_s, begin)
         position, torque = inputs
         speed = (position[1] - position[0]) * self.sample_rate_hz
         return simulate_law(
             position, self.sample_rate_hz, p, self._observer, None, e, elapsed_s,
-            added_torque=torque, start=(float(position[0]), float(speed)),
+            added_torque=torque, start=(float(position[0]), float(speed)), begin=begin,
         )  # fmt: skip

@@ -25,6 +25,7 @@ MORE_STEPS = 160  # along a valley in which sizes and parameters nearly replace 
 _NESTED_STEPS = 3
 _FIRST_STEPS = 6
 RIPPLES_TRIED = 4
+_LITTLE = 0.95  # of the parent's chi-square: another start of what leaves more is not pursued
 _RIVAL = 1.5  # a second start that stays this far above the first is not pursued
 NO_PROMISE = 0.998  # of the parent's chi-square: a start that gains less is not pursued far
 
@@ -250,6 +251,8 @@ class Fitter:
         for _, space, point in _different(proposals, _KEPT_STARTS):
             limit = give_up_above
             fits.append(self.solve(names, space, point, limit, known=parent.solution.jacobian))
+            if fits[-1].train_chi2 > _LITTLE * parent.train_chi2:
+                break
             rival = _RIVAL * fits[-1].train_chi2
             give_up_above = rival if limit is None else min(limit, rival)
         return min(fits, key=lambda fit: (not fit.converged, fit.train_chi2))

@@ -22,7 +22,7 @@ from .least_squares import Solution
 from .search_space import Space, beside
 
 _SIZES = (0.1, 0.3, 3.0)  # of the size that the linear prediction asks for, tried after that
-_TRIED = 6
+_TRIED = 4
 _SCALED = 2
 _FOLLOW = 0.1  # how far a parameter of the parent may follow, relative
 
@@ -95,15 +95,21 @@ class Screening:
         inverse = np.linalg.pinv(other.jacobian, rcond=1e-6)
         return _candidates(other, self._seeds, self._changes * ratio, inverse, costs)[0].gain
 
+    def least(self) -> float:
+        """Return the least cost of the best seeds, tried at the sizes that promise most."""
+        if not self._tries.any:
+            chosen = self._candidates[:_TRIED]
+            self._tries.run([(c, size) for c in chosen for size in sorted({c.size, 1.0})])
+            self._tries.run([(c, 1.0) for c in chosen], "kept")
+        return self._tries.proposals()[0][0]
+
     def proposals(self) -> list[Proposal]:
-        """Return starting points, tried at several sizes, the most promising first.
+        """Return starting points, tried at several more sizes, the most promising first.
 
         Returns:
             (cost, space, point), ascending in cost.
         """
-        chosen = self._candidates[:_TRIED]
-        self._tries.run([(c, size) for c in chosen for size in sorted({c.size, 1.0})])
-        self._tries.run([(c, 1.0) for c in chosen], "kept")
+        self.least()
         best = self._tries.best(_SCALED)
         self._tries.run([(c, c.size * factor) for c in best for factor in _SIZES])
         self._tries.run_straightened(best)
@@ -140,6 +146,11 @@ class _Tries:
         for (candidate, _), point, cost in zip(tries, points, costs, strict=True):
             self._found.append((float(cost), candidate, point))
         self._found.sort(key=lambda one: one[0])
+
+    @property
+    def any(self) -> bool:
+        """Whether something was tried."""
+        return bool(self._found)
 
     def best(self, most: int) -> list[_Candidate]:
         """Return the candidates that did best so far."""

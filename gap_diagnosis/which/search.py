@@ -46,6 +46,7 @@ _PROMISING_SECONDS = 5
 _PROMISING_PARTNERS = 2
 _HELD = 2  # of the leading effects: what holds one of them is tried as well
 _SCREENED = 2  # times as many are tried at several sizes as are fitted
+_SCALED, _FITTED = 12, 8  # effects that are tried at more sizes, and of these fitted
 
 Progress = Callable[[str], None]
 
@@ -62,6 +63,7 @@ class Search:
         self._fits: dict[tuple[str, ...], Fit] = {}
         self._refit: Fit | None = None
         self._first: dict[str, Screening] = {}
+        self._holding: list[Fit] = []  # laws of which one part does as well
         self._groups = fitter.train.groups()
 
     def misfit(self, fit: Fit) -> float:
@@ -118,7 +120,7 @@ class Search:
         Args:
             parent: the explanation to extend.
             effects: identifiers to add, one at a time.
-            most: how many of them to pursue; None for all.
+            most: how many of them to pursue; None for those that start well.
             near: how many times the best chi-square a converged fit may have to be left alone.
         """
         if self._over:
@@ -130,8 +132,9 @@ class Search:
         names, nominal = self._fitter.catalogue, self._fitter.nominal
         effects = founded(effects, parent.effects, nominal, names)
         hopeful, screened = self._screenings(parent, effects, most)
+        hopeful = sorted(hopeful, key=lambda effect: screened[effect].least())[:_SCALED]
         proposals = {effect: screened[effect].proposals() for effect in hopeful}
-        ordered = sorted(hopeful, key=lambda effect: proposals[effect][0][0])[:most]
+        ordered = sorted(hopeful, key=lambda effect: proposals[effect][0][0])[: most or _FITTED]
         for partner in partners(ordered[:_PROMISING_PARTNERS], set(effects) - set(ordered)):
             if partner not in proposals:
                 again = screened.get(partner) or self._fitter.screening(parent, partner)
@@ -311,14 +314,17 @@ class Search:
         self._drop_holders(2)
 
     def _drop_holders(self, count: int) -> None:
-        """Drop explanations by a law that nobody asked for where one of its parts does as well."""
+        """Drop explanations by a law that nobody asked for where one of its parts does as well.
+
+        None of them leads then; but that the law is more than its part is not shown to be wrong.
+        """
         for effects in [e for e in self._fits if len(e) == count]:
             for held in (e for e in effects if e not in self._fitter.catalogue):
                 rest = [e for e in effects if e != held]
                 parts = (tuple(sorted((*rest, p))) for p in fx.EFFECTS[held].contains)
                 plain = [self._fits[p] for p in parts if p in self._fits]
                 if any(not self._calls_for(p, self._fits[effects], SECOND_GAIN) for p in plain):
-                    del self._fits[effects]
+                    self._holding.append(self._fits.pop(effects))
                     break
 
     def _settled(self, count: int, near: float) -> set[tuple[str, ...]]:
@@ -341,11 +347,14 @@ class Search:
     def _tied(self, best: Fit) -> tuple[Fit, ...]:
         """Return the converged explanations of as many effects that do as well as the best.
 
-        One that only contains the best is no rival.
+        One that only contains the best is no rival, but a law of several parts of which the best
+        is one may be what is there.
         """
         if not best.effects:
             return ()
         limit = tie_limit(self.misfit(best), self._fitter.held.size)
         rivals = [fit for fit in self._sure(len(best.effects)) if self.misfit(fit) < limit]
         own = best.effects
-        return tuple(f for f in rivals if f.effects != own and not fx.contains(f.effects, own))
+        others = [f for f in rivals if f.effects != own and not fx.contains(f.effects, own)]
+        holding = [f for f in self._holding if fx.contains(f.effects, own)]
+        return (*others, *(fit for fit in holding if self.misfit(fit) < limit))

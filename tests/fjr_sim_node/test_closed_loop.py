@@ -198,3 +198,19 @@ def test_a_motion_below_the_least_double_is_simulated():
         added_torque=torque,
     )
     assert np.isfinite(out.position).all()
+
+
+@pytest.mark.parametrize("general", [False, True])
+def test_a_simulation_goes_on_from_the_state_in_which_another_ended(general):
+    pd = pd_filtered.coefficients(pd_filtered.CONTROLLER.check({"sample_rate_hz": RATE}))
+    law = TransferFunction.of_pd(pd) if general else pd
+    on = {"delay.time_s": 2.4e-3, "hysteresis.torque_nm": 1.0, "hysteresis.displacement_rad": 1e-4}
+    rig = plant.coefficients(plant.PLANT.defaults()), law, None, fx.coefficients(on)
+    r = reference(7e-3)[:4000]
+    whole = closed_loop.simulate(r, RATE, *rig)
+    half = closed_loop.simulate(r[:1700], RATE, *rig)
+    for _ in range(2):  # the state is left as it was
+        rest = closed_loop.simulate(r[1700:], RATE, *rig, begin=half.end)
+        for name in ("position", "torque", "link", "motor"):
+            parts = getattr(half, name), getattr(rest, name)
+            assert np.array_equal(np.concatenate(parts), getattr(whole, name))
