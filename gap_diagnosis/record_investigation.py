@@ -262,10 +262,13 @@ def _alternatives(
     best = found.best
     near = {*partners([tested.effect], set(names))}
     others = sorted({*near, *found.alternatives.get(tested.effect, ())} - set(best.effects))
-    tied = []
-    for effect in founded(others, tested.without.effects, fitter.nominal, names):
-        proposals = fitter.screening(tested.without, effect).proposals()
-        other = fitter.add(tested.without, effect, proposals) if proposals else None
+    tied, beside = [], tested.without.effects
+    searched = {fit.effects: fit for fits in found.rivals.values() for fit in fits}
+    for effect in founded(others, beside, fitter.nominal, names):
+        other = searched.get((*beside, effect))
+        if other is None:
+            proposals = fitter.screening(tested.without, effect).proposals()
+            other = fitter.add(tested.without, effect, proposals) if proposals else None
         if other is None:
             continue
         as_well = partial(_does_as_well, fitter, best, tested, effect in near)

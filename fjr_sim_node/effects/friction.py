@@ -139,7 +139,7 @@ FRICTION: tuple[Effect, ...] = (
                             "sigma1, while they bend further", 0.0, 1e4),
         ),
         (
-            {"stribeck_nm": (0.01,), "bristle_nm_rad": (1.0, 10.0, 100.0),
+            {"stribeck_nm": (0.01,), "bristle_nm_rad": (1.0, 10.0),
              "velocity_rad_s": (0.0025, 0.0125, 0.06), "damping_nm_s_rad": (0.005,)},
         ),
         contains=("stribeck_friction_motor", "presliding_friction"),

@@ -26,10 +26,10 @@ from fjr_interface.parameters import Parameter, ParameterGroup
 from fjr_kit.compiled import jit
 
 from .. import effects as fx
-from .places import FS, FSM, FV, FVM, JM, K0, K1, J
+from .places import FS, FSM, FV, FVM, JM, K0, K1, LINK_BRISTLES, MOTOR_BRISTLES, J
 from .presliding import with_bristles
 from .spring import deflection, deflection_speed, spring_region
-from .step_size import fastest_rate, pushes, reach, reach_within_energy
+from .step_size import fastest_rate, pushes, reach, reach_within_energy, slackened
 from .stick_slip import (
     advance_smoothly,
     facing,
@@ -139,10 +139,13 @@ def _advance(s, torque, w, duration, p, e):
     """Return state and build-up after a duration of constant torque."""
     link, motor = pushes(s, torque, w, p, e)
     twist = reach(s, link, motor, duration, p, e)
-    steps = fastest_rate(twist, s, torque, p, e) * duration / _PHASE_PER_STEP
+    rated = p
+    if e is not None and (p[LINK_BRISTLES] != 0.0 or p[MOTOR_BRISTLES] != 0.0):
+        rated = slackened(s, torque, w, duration, p, e)
+    steps = fastest_rate(twist, s, torque, rated, e) * duration / _PHASE_PER_STEP
     if steps > _CHEAP_SUBSTEPS:
         twist = min(twist, reach_within_energy(s, link, motor, duration, p, e))
-        steps = fastest_rate(twist, s, torque, p, e) * duration / _PHASE_PER_STEP
+        steps = fastest_rate(twist, s, torque, rated, e) * duration / _PHASE_PER_STEP
     if not (steps < _MAX_SUBSTEPS and math.isfinite(torque)):
         nan = math.nan
         return (nan, nan, nan, nan, nan, nan, nan), w

@@ -10,9 +10,19 @@ import math
 from fjr_kit.compiled import inlined, jit
 
 from .. import effects as fx
+from .motion import link_torque, motor_torque
 from .places import FS, FV, FVM, JM, K0, K1, LINK_BRISTLES, MOTOR_BRISTLES, J, is_rigid
-from .spring import deflection, deflection_speed
-from .torques import load_coefficient, motor_level_bound
+from .spring import deflection, deflection_speed, transmitted_torque
+from .torques import (
+    link_level,
+    link_viscous,
+    load_coefficient,
+    motor_level,
+    motor_level_bound,
+    motor_viscous,
+)
+
+_SURELY_ON = 3.0  # times the change of speed that a hold can make
 
 
 @inlined
@@ -77,6 +87,52 @@ def reach_within_energy(s, link, motor, duration, p, e):
     if p[K1] > 0.0:
         return slack + math.sqrt(max(peak - soft, 0.0) / p[K1])
     return slack + root * math.sqrt(2.0 / soft) if soft > 0.0 else math.inf
+
+
+@inlined
+def _still_bent(state, level, speed, acceleration, duration):
+    """Return which share of their stiffness bristles show in a hold that cannot turn the motion.
+
+    Once they hold as much as they can they only slip: dF/dx = sigma (1 - F / level), F along the
+    motion.
+
+    Args:
+        state: torque of the bristles (N m).
+        level: Coulomb level in the direction of motion (N m).
+        speed: with its sign (rad/s).
+        acceleration: greatest one against the motion (rad/s2).
+        duration: of the hold (s).
+    """
+    if level <= 0.0 or abs(speed) < _SURELY_ON * acceleration * duration:
+        return 1.0
+    along = state if speed > 0.0 else -state
+    return min(2.0 * abs(1.0 - along / level), 1.0)
+
+
+@jit
+def slackened(s, torque, w, duration, p, e):
+    """Return the parameters with no more stiffness of bristles than the motion of a hold can show.
+
+    Args:
+        s: state.
+        torque: motor torque (N m).
+        w: what has built up, `motion`.
+        duration: of the hold (s).
+        p: parameters.
+        e: effects.
+    """
+    link, motor = p[LINK_BRISTLES], p[MOTOR_BRISTLES]
+    m = (1.0 if s[1] > 0.0 else -1.0, 1.0 if s[3] > 0.0 else -1.0, 1.0, 0.0)
+    te = transmitted_torque(s[0], s[1], s[2], s[3], w[2], p, e)
+    if link != 0.0:
+        level = link_level(abs(s[1]), p, e)
+        drive = abs(link_torque(s, te, p, e)) + level + abs(link_viscous(s[1], p, e))
+        link *= _still_bent(w[0], level, s[1], drive / p[J], duration)
+    if motor != 0.0:
+        level = motor_level(abs(s[3]), m[1], s[2], te, p, e)
+        drive = abs(motor_torque(s, te, torque, p, e)) + level + abs(motor_viscous(s[3], p, e))
+        motor *= _still_bent(w[1], level, s[3], drive / p[JM], duration)
+    return p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], link, motor
 
 
 @inlined
@@ -154,7 +210,8 @@ def _decay_by_friction(s, p, e):
     motor += e[fx.LUGRE_FRICTION_STRIBECK_NM] / e[fx.LUGRE_FRICTION_VELOCITY_RAD_S]
     if e[fx.LUGRE_FRICTION_BRISTLE_NM_RAD] != math.inf:
         # sigma1 exp(-u^2) (1 - F / L) v: |1 - F / L| <= 2, and L falls as fast as sigma1 does
-        motor += 3.0 * e[fx.LUGRE_FRICTION_DAMPING_NM_S_RAD]
+        share = p[MOTOR_BRISTLES] / e[fx.LUGRE_FRICTION_BRISTLE_NM_RAD]  # see `slackened`
+        motor += 3.0 * share * e[fx.LUGRE_FRICTION_DAMPING_NM_S_RAD]
     return link / p[J] + motor / p[JM]
 
 

@@ -134,15 +134,24 @@ class CellFitter:
         costs = partial(self.weights.costs, parent.variance)
         return screened.gain_beside(parent.solution, ratio, costs)
 
-    def add(self, parent: CellFit, effect: str, proposals: Sequence[Proposal]) -> CellFit | None:
-        """Fit a parent's explanation with one effect more; None if no start promises anything."""
+    def add(
+        self, parent: CellFit, effect: str, proposals: Sequence[Proposal], most: int = _STARTS
+    ) -> CellFit | None:
+        """Fit a parent's explanation with one effect more; None if no start promises anything.
+
+        Args:
+            parent: the explanation to extend.
+            effect: identifier of the effect to add.
+            proposals: from `screening(parent, effect)`.
+            most: how many starts are pursued.
+        """
         best: CellFit | None = None
         kept: list[Space] = []
-        begun = float(self.weights.costs(parent.variance, parent.solution.residuals[None])[0])
+        begun = self.begun(parent)
         numbers = self.weights.numbers(parent.variance).sum()
         rival = proposals[0][0] + _RIVAL * numbers if proposals else begun
         for cost, space, point in proposals:
-            if cost > min(begun - _LEAST_PROMISE, rival) or len(kept) == _STARTS:
+            if cost > min(begun - _LEAST_PROMISE, rival) or len(kept) == most:
                 break
             if any(space is one for one in kept):
                 continue
@@ -154,6 +163,10 @@ class CellFitter:
             if best is None or self.gains(fit, best).sum() > 0.0:
                 best = fit
         return None if best is None else replace(best, acts=self.acted(best, effect))
+
+    def begun(self, parent: CellFit) -> float:
+        """Return what a fit costs itself, as its proposals do."""
+        return float(self.weights.costs(parent.variance, parent.solution.residuals[None])[0])
 
     def further(self, fit: CellFit) -> CellFit:
         """Return a fit taken further from where it stands."""

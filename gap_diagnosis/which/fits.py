@@ -26,6 +26,10 @@ _NESTED_STEPS = 3
 _FIRST_STEPS = 6
 RIPPLES_TRIED = 4
 _LITTLE = 0.95  # of the parent's chi-square: another start of what leaves more is not pursued
+_HOPELESS = (
+    2.0  # times what a fit may leave to be pursued: nor is another start of what leaves more
+)
+_FOUND = 0.01  # of the parent's chi-square: nor is another start of what leaves less
 _RIVAL = 1.5  # a second start that stays this far above the first is not pursued
 NO_PROMISE = 0.998  # of the parent's chi-square: a start that gains less is not pursued far
 
@@ -251,7 +255,8 @@ class Fitter:
         for _, space, point in _different(proposals, _KEPT_STARTS):
             limit = give_up_above
             fits.append(self.solve(names, space, point, limit, known=parent.solution.jacobian))
-            if fits[-1].train_chi2 > _LITTLE * parent.train_chi2:
+            left, most = fits[-1].train_chi2, _LITTLE * parent.train_chi2
+            if left > min(most, _HOPELESS * (limit or most)) or left < _FOUND * parent.train_chi2:
                 break
             rival = _RIVAL * fits[-1].train_chi2
             give_up_above = rival if limit is None else min(limit, rival)

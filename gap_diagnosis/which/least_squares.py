@@ -1,7 +1,7 @@
 """Bounded nonlinear least squares by Levenberg-Marquardt, with residuals evaluated in batches.
 
-All finite differences of a Jacobian, and the trial steps of a damping search, are one batch, so
-that a simulator can run them in parallel, by one call; scipy's `least_squares` asks for each point
+All finite differences of a Jacobian are one batch, so that a simulator can run them in parallel, by
+one call; scipy's `least_squares` asks for each point
 by a call of its own (from 1.16 on, for those of a Jacobian in parallel). Between fresh Jacobians
 Broyden's rank-one update follows what the steps show (Nocedal, Wright 2006, ch. 11); a fit is
 called converged only by a fresh one.
@@ -18,7 +18,7 @@ Residuals = Callable[[np.ndarray], np.ndarray]
 """Takes points (n, parameters), returns error vectors (n, errors)."""
 
 _STEP = 1e-6  # a loop near its stability margin bends within 1e-4 already
-_DAMPINGS = np.array([1.0, 1e2])  # tried at once, times the present damping
+_DAMPINGS = np.array([1.0, 1e2])  # tried one after the other, times the present damping
 _LEAST_DAMPING, _MOST_DAMPING = 1e-7, 1e6
 _FRESH_DAMPING, _MUCH_DAMPING = 1.0, 1e2  # first tried with a fresh Jacobian; small steps beyond
 _SMALL_GAIN = 1e-3
@@ -124,14 +124,12 @@ class _Search:
         while True:
             if self._updates is None or self._updates > _MOST_UPDATES:
                 self._differentiate()
-            dampings = self._damping * _DAMPINGS
-            trials = np.array([self._trial(damping) for damping in dampings])
-            errors = self._residuals(trials)
-            costs = np.array([_cost(row) for row in errors])
-            best = int(np.argmin(costs))
-            if costs[best] < self.cost:
-                self._accept(trials[best], errors[best], float(dampings[best]))
-                return not self.converged
+            for damping in self._damping * _DAMPINGS:
+                trial = self._trial(damping)
+                errors = self._residuals(trial[None])[0]
+                if _cost(errors) < self.cost:
+                    self._accept(trial, errors, float(damping))
+                    return not self.converged
             if self._updates:
                 self._updates = None
             elif self._damping >= (_MUCH_DAMPING if self._small else _MOST_DAMPING):

@@ -148,6 +148,8 @@ class Search:
             limit = _GIVE_UP * max(least, self._fitter.train.size)
             if most is not None:
                 limit = min(limit, parent.train_chi2 / _SECOND_PROMISE)
+            if effect not in names:  # a law of several parts has to do better than its best part
+                limit = min(limit, least)
             fit = self._fitter.add(parent, effect, proposals[effect], limit)
             key = fit.effects
             if key not in self._fits or fit.train_chi2 < self._fits[key].train_chi2:

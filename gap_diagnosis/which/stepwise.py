@@ -7,7 +7,7 @@ than these parts differ; an effect that the others can do without is taken out a
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -17,10 +17,12 @@ from fjr_sim_node import effects as fx
 
 from .cell_fits import CellFit, CellFitter
 from .equivalents import founded, holders, partners
-from .screening import Screening
+from .screening import Proposal, Screening
 
 MOST_CAUSES = 5
-_PROPOSED, _FITTED = 7, 5
+_PROPOSED, _FITTED, _STARTS = (7, 5), (5, 3), (2, 1)
+"""Effects that are tried at several sizes, those of them that are fitted, and from how many starts:
+beside no cause yet, beside others."""
 _POLISHED = 2  # leading fits of a step that are taken further
 _AGAIN = 8  # effects without ripple that are screened beside a cause
 _OUTDATED = 0.1  # of the squared error that is left: then what was screened before is too far
@@ -32,15 +34,22 @@ LEAST_SHARE = 0.75
 """Least share of the ranks that the parts which gain must hold."""
 MOST_P = 0.05
 """Greatest p-value of the signed-rank test that parts gain as often and as much as they lose."""
+LEAST_CLOSED = 0.25
+"""Least share of what is left, in the band where it gains most, that a further cause closes: one
+that closes less would not be named, for it may be a part of what no effect explains."""
+LEAST_CLOSED_LATER = 0.5
+"""The same for a third cause and any later one, of which one must be sure."""
 TIED_SHARE = 0.15
 """An effect stands for another if it is behind by less than this share of the other's gain..."""
 TIED_P = 0.1
 """...or by less than half of it and unseen parts do not show the difference."""
 
+_CERTAIN_CAUSES = 2
 _FEW = 5  # parts: of fewer no rank test is sure
 _COUNTED = 5.0  # nats, the most that one of few parts counts
 
 _MUCH_LESS = 0.3  # of the greatest gain: a cause that gains less waits for the next step
+_START_LESS = 0.2  # of the greatest gain of a start: an effect whose best one gains less waits
 _NEUTRAL = 0.02  # of the greatest gain of a part: parts that change by less say nothing
 
 Progress = Callable[[str], None]
@@ -170,7 +179,9 @@ class Stepwise:
             fits = self._extended(found.best)
             found.rivals[len(found.best.effects) + 1] = fits
             chosen = self._chosen(fits, found.best)
-            if chosen is None:
+            if chosen is None or self._fitter.closed(chosen, found.best) < self._least_closed(
+                found
+            ):
                 break
             found.alternatives[chosen.effects[-1]] = self._tied(chosen, fits, found.best)
             found.steps.append(chosen)
@@ -180,16 +191,22 @@ class Stepwise:
     def _over(self) -> bool:
         return time.monotonic() > self._until
 
+    @staticmethod
+    def _least_closed(found: Found) -> float:
+        """Return how much of its best band a further cause must close to be named in the end."""
+        return LEAST_CLOSED if len(found.best.effects) < _CERTAIN_CAUSES else LEAST_CLOSED_LATER
+
     def _extended(self, parent: CellFit) -> list[CellFit]:
         """Return the parent with each promising effect more, best on unseen parts first."""
         names, nominal = self._effects, self._fitter.nominal
         effects = [e for e in names if e not in parent.effects]
         effects = founded(effects, parent.effects, nominal, names)
         screened = self._screened(parent, effects)
-        hopeful = sorted(screened, key=lambda e: -screened[e].gain)[:_PROPOSED]
+        later = bool(parent.effects)
+        hopeful = sorted(screened, key=lambda e: -screened[e].gain)[: _PROPOSED[later]]
         proposals = {e: screened[e].proposals() for e in hopeful}
         ordered = sorted((e for e in hopeful if proposals[e]), key=lambda e: proposals[e][0][0])
-        chosen = ordered[:_FITTED]
+        chosen = self._worth_a_fit(parent, proposals, ordered[: _FITTED[later]])
         held = founded(holders(chosen[:2], names), parent.effects, nominal, names)
         alike = {*partners(chosen[:2], set(effects)), *held}
         for effect in sorted(alike - set(chosen)):
@@ -200,12 +217,23 @@ class Stepwise:
         fits = []
         for number, effect in enumerate(chosen, 1):
             self._progress(f"{' + '.join((*parent.effects, effect))} ({number} of {len(chosen)})")
-            fit = self._fitter.add(parent, effect, proposals[effect])
+            fit = self._fitter.add(parent, effect, proposals[effect], _STARTS[later])
             if fit is not None:
                 fits.append(fit)
         fits = self._ranked(fits, parent)
         leading = [self._settled(fit) for fit in fits[:_POLISHED]]
         return self._ranked([*leading, *fits[_POLISHED:]], parent)
+
+    def _worth_a_fit(
+        self, parent: CellFit, proposals: Mapping[str, list[Proposal]], ordered: list[str]
+    ) -> list[str]:
+        """Return the effects whose starts gain enough beside the best start of all.
+
+        What gains much less waits for the next step anyway.
+        """
+        gains = {e: self._fitter.begun(parent) - proposals[e][0][0] for e in ordered}
+        most = max(gains.values(), default=0.0)
+        return [e for e in ordered if gains[e] >= _START_LESS * most]
 
     def _ranked(self, fits: Sequence[CellFit], parent: CellFit) -> list[CellFit]:
         return sorted(fits, key=lambda fit: -self._gain(fit, parent).mean)
