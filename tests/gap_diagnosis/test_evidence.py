@@ -162,7 +162,8 @@ def test_an_effect_must_repeat_only_where_it_acts():
     assert where_it_acts.present and where_it_acts.p == 0.5 ** np.sum(levels == 1)
 
 
-def test_a_leading_fit_is_taken_to_its_end_before_it_is_compared():
+def test_a_leading_fit_is_taken_to_its_end_before_it_is_compared(monkeypatch):
+    monkeypatch.setattr("gap_diagnosis.which.cell_fits._ADDED_ROUNDS", (3,))
     limit = {"torque_saturation.limit_nm": 60.0}
     evidence = Evidence(records(limit, runs=2, seconds=5.0, scatter=0.02), NOMINAL)
     fitter = CellFitter(evidence, NOMINAL, 0.1)

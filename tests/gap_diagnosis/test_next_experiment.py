@@ -90,7 +90,7 @@ def together(case, proposed) -> RecordedExperiment:
         (
             {"piecewise_stiffness.zone_rad": 2e-3, "piecewise_stiffness.soft_ratio": 0.6},
             (1e-2,),
-            1e-4,
+            8e-5,
             ("backlash", "piecewise_stiffness"),
             {"piecewise_stiffness"},
         ),
