@@ -120,6 +120,7 @@ FRICTION: tuple[Effect, ...] = (
         ),
         # A side that starts below what is negligible never leaves it.
         ({"motor_rad": _SHORT, "link_rad": _SHORT},),
+        looks_like="friction that builds up",
         modifies="coulomb_friction",
     ),
     Effect(
@@ -142,6 +143,7 @@ FRICTION: tuple[Effect, ...] = (
             {"stribeck_nm": (0.01,), "bristle_nm_rad": (1.0, 10.0),
              "velocity_rad_s": (0.0025, 0.0125, 0.06), "damping_nm_s_rad": (0.005,)},
         ),
+        looks_like="friction that builds up",
         contains=("stribeck_friction_motor", "presliding_friction"),
         on_request=True,
         modifies="coulomb_friction",

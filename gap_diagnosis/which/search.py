@@ -318,7 +318,7 @@ class Search:
     def _drop_holders(self, count: int) -> None:
         """Drop explanations by a law that nobody asked for where one of its parts does as well.
 
-        None of them leads then; but that the law is more than its part is not shown to be wrong.
+        None of them leads then; see `_tied`.
         """
         for effects in [e for e in self._fits if len(e) == count]:
             for held in (e for e in effects if e not in self._fitter.catalogue):
@@ -349,8 +349,9 @@ class Search:
     def _tied(self, best: Fit) -> tuple[Fit, ...]:
         """Return the converged explanations of as many effects that do as well as the best.
 
-        One that only contains the best is no rival, but a law of several parts of which the best
-        is one may be what is there.
+        One that only contains the best is no rival. But a law of several parts of which the best is
+        one may be what is there, where it gains what calls for an effect, if not the factor that it
+        takes to lead; or where it does as well and both look alike.
         """
         if not best.effects:
             return ()
@@ -358,5 +359,9 @@ class Search:
         rivals = [fit for fit in self._sure(len(best.effects)) if self.misfit(fit) < limit]
         own = best.effects
         others = [f for f in rivals if f.effects != own and not fx.contains(f.effects, own)]
-        holding = [f for f in self._holding if fx.contains(f.effects, own)]
-        return (*others, *(fit for fit in holding if self.misfit(fit) < limit))
+        for fit in self._holding:
+            as_well = stands_for(fit.effects, own) and self.misfit(fit) < limit
+            may_be = as_well or self._calls_for(best, fit, SMALL_GAIN)
+            if fx.contains(fit.effects, own) and may_be:
+                others.append(fit)
+        return tuple(others)
