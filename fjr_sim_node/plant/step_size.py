@@ -116,20 +116,19 @@ def slackened(s, torque, w, duration, p, e):
     Args:
         s: state.
         torque: motor torque (N m).
-        w: what has built up, `motion`.
+        w: what has built up where the hold begins.
         duration: of the hold (s).
-        p: parameters.
-        e: effects.
+        p: parameters with the bristles' stiffnesses.
+        e: parameters of the effects.
     """
     link, motor = p[LINK_BRISTLES], p[MOTOR_BRISTLES]
-    m = (1.0 if s[1] > 0.0 else -1.0, 1.0 if s[3] > 0.0 else -1.0, 1.0, 0.0)
     te = transmitted_torque(s[0], s[1], s[2], s[3], w[2], p, e)
     if link != 0.0:
         level = link_level(abs(s[1]), p, e)
         drive = abs(link_torque(s, te, p, e)) + level + abs(link_viscous(s[1], p, e))
         link *= _still_bent(w[0], level, s[1], drive / p[J], duration)
     if motor != 0.0:
-        level = motor_level(abs(s[3]), m[1], s[2], te, p, e)
+        level = motor_level(abs(s[3]), 1.0 if s[3] > 0.0 else -1.0, s[2], te, p, e)
         drive = abs(motor_torque(s, te, torque, p, e)) + level + abs(motor_viscous(s[3], p, e))
         motor *= _still_bent(w[1], level, s[3], drive / p[JM], duration)
     return p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], link, motor

@@ -25,11 +25,9 @@ MORE_STEPS = 160  # along a valley in which sizes and parameters nearly replace 
 _NESTED_STEPS = 3
 _FIRST_STEPS = 6
 RIPPLES_TRIED = 4
-_LITTLE = 0.95  # of the parent's chi-square: another start of what leaves more is not pursued
-_HOPELESS = (
-    2.0  # times what a fit may leave to be pursued: nor is another start of what leaves more
-)
-_FOUND = 0.01  # of the parent's chi-square: nor is another start of what leaves less
+_LITTLE = 0.95  # of the parent's chi-square: another start of what leaves more is not pursued,
+_HOPELESS = 2.0  # nor of what leaves as many times that up to which a fit goes on,
+_FOUND = 0.01  # nor of what leaves less than this share of the parent's
 _RIVAL = 1.5  # a second start that stays this far above the first is not pursued
 NO_PROMISE = 0.998  # of the parent's chi-square: a start that gains less is not pursued far
 

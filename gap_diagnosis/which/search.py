@@ -351,7 +351,8 @@ class Search:
 
         One that only contains the best is no rival. But a law of several parts of which the best is
         one may be what is there, where it gains what calls for an effect, if not the factor that it
-        takes to lead; or where it does as well and both look alike.
+        takes to lead; or where it does as well and both look alike. Likewise a part of the best
+        that looks like it, if the form of its law may be all that it leaves.
         """
         if not best.effects:
             return ()
@@ -363,5 +364,10 @@ class Search:
             as_well = stands_for(fit.effects, own) and self.misfit(fit) < limit
             may_be = as_well or self._calls_for(best, fit, SMALL_GAIN)
             if fx.contains(fit.effects, own) and may_be:
+                others.append(fit)
+        there = {fit.effects for fit in others}
+        for fit in self._ranked(len(own)):
+            part = fx.contains(own, fit.effects) and stands_for(fit.effects, own)
+            if part and fit.effects not in there and self._owed_to_its_form(fit):
                 others.append(fit)
         return tuple(others)
