@@ -10,26 +10,14 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 from fjr_sim_node import effects as fx
 
-from .attribution import (
-    CERTAIN,
-    MOST_LEFT,
-    NOTHING_LEFT,
-    PLAIN,
-    SECOND_GAIN,
-    SMALL_GAIN,
-    STANDS_OUT,
-    Attribution,
-    stands_out,
-    tie_limit,
-)
+from .attribution import NOTHING_LEFT, SECOND_GAIN, SMALL_GAIN, Attribution
 from .equivalents import SCALES, founded, holders, partners, stands_for
-from .estimates import sure
 from .fits import Fit, Fitter
 from .harmonics import with_second_harmonics
+from .ranking import Ranking
 from .reduced_fits import without, without_scale
 from .screening import Screening
 
@@ -39,7 +27,6 @@ _GIVE_UP = 4.0
 _NEAR = 10.0
 _ALIKE = 1.3  # near equivalents that fit worse than this are looked for again from each other
 _WORTH_A_PAIR = 2.0
-_FORM = 0.0025  # of the misfit: a law is wrong by up to 5 % (rms) of what it does
 _WORTH_A_HARMONIC = 1.3
 _SECOND_PROMISE = 1.2  # a second effect that has not gained that much after a few steps is dropped
 _PROMISING_SECONDS = 5
@@ -60,15 +47,8 @@ class Search:
         """Take the fitter, who is told of each try, and when to stop adding (`time.monotonic`)."""
         self._fitter, self._progress = fitter, progress
         self._until, self._complete = until, True
-        self._fits: dict[tuple[str, ...], Fit] = {}
-        self._refit: Fit | None = None
+        self._found = Ranking(fitter)
         self._first: dict[str, Screening] = {}
-        self._holding: list[Fit] = []  # laws of which one part does as well
-        self._groups = fitter.train.groups()
-
-    def misfit(self, fit: Fit) -> float:
-        """Return the chi-square per degree of freedom of a fit over held-out realizations."""
-        return fit.held_chi2 / self._fitter.held.size
 
     def _best(self, count: int) -> Fit | None:
         """Return the best explanation of `count` effects; None if none has converged.
@@ -77,40 +57,44 @@ class Search:
         fit has not seen decides with the same weight; among those that can't be told apart, the one
         with the fewest parameters. What cannot be told from zero has no name.
         """
-        ranked = self._sure(count)
-        close = [f for f in ranked[:_FINALISTS] if self.misfit(f) < _CLOSE * self.misfit(ranked[0])]
+        ranked = self._found.sure(count)
+        close = [
+            f
+            for f in ranked[:_FINALISTS]
+            if self._found.misfit(f) < _CLOSE * self._found.misfit(ranked[0])
+        ]
         if len(close) < 2:
             return ranked[0] if ranked else None
         scores = []
         for fit in close:
             self._progress(f"{' + '.join(fit.effects)} on unseen amplitudes")
             amplitudes = self._fitter.across_levels(fit)
-            scores.append(self.misfit(fit) * (1.0 if amplitudes is None else amplitudes))
+            scores.append(self._found.misfit(fit) * (1.0 if amplitudes is None else amplitudes))
         best = close[scores.index(min(scores))]
-        tied = [best, *self._tied(best)]
+        tied = [best, *self._found.tied(best)]
         return min(
             tied,
-            key=lambda fit: (len(fit.space.effects), fx.rare(fit.effects), self.misfit(fit)),
+            key=lambda fit: (len(fit.space.effects), fx.rare(fit.effects), self._found.misfit(fit)),
         )
 
     def run(self) -> Attribution:
         """Search and judge."""
         self._progress("refit of the base parameters")
-        refit = self._refit = self._fitter.refit()
+        refit = self._found.refit = self._fitter.refit()
         self._extend(refit, self._fitter.catalogue)
-        leading = [fit.effects[0] for fit in self._ranked(1)[:_HELD]]
+        leading = [fit.effects[0] for fit in self._found.ranked(1)[:_HELD]]
         self._extend(refit, holders(leading, self._fitter.catalogue))
         self._drop_holders(1)
         best = refit
         self._polish(1)
         self._enrich(1)
-        single = self._sure(1)
-        if single and self._calls_for(refit, single[0], SMALL_GAIN):
+        single = self._found.sure(1)
+        if single and self._found.calls_for(refit, single[0], SMALL_GAIN):
             best = self._best(self._effects_needed(single[0])) or single[0]
+        found = self._found
         return Attribution(
-            refit, self._all_ranked(), best, self._tied(best), self._explains(refit, best),
-            self._complete,
-        )  # fmt: skip
+            refit, found.all(), best, found.tied(best), found.explains(refit, best), self._complete
+        )
 
     def _extend(
         self, parent: Fit, effects: Sequence[str], most: int | None = None, near: float = _NEAR
@@ -125,9 +109,9 @@ class Search:
         """
         if self._over:
             return
-        rivals = [fit.train_chi2 for fit in self._ranked(len(parent.effects) + 1)]
+        rivals = [fit.train_chi2 for fit in self._found.ranked(len(parent.effects) + 1)]
         least = min(parent.train_chi2, *rivals) if rivals else parent.train_chi2
-        settled = self._settled(len(parent.effects) + 1, near)
+        settled = self._found.settled(len(parent.effects) + 1, near)
         effects = [e for e in effects if tuple(sorted((*parent.effects, e))) not in settled]
         names, nominal = self._fitter.catalogue, self._fitter.nominal
         effects = founded(effects, parent.effects, nominal, names)
@@ -152,8 +136,8 @@ class Search:
                 limit = min(limit, least)
             fit = self._fitter.add(parent, effect, proposals[effect], limit)
             key = fit.effects
-            if key not in self._fits or fit.train_chi2 < self._fits[key].train_chi2:
-                self._fits[key] = fit
+            if key not in self._found.fits or fit.train_chi2 < self._found.fits[key].train_chi2:
+                self._found.fits[key] = fit
             least = min(least, fit.train_chi2)
 
     def _screenings(
@@ -188,97 +172,34 @@ class Search:
 
     def _enrich(self, count: int) -> None:
         """Give second harmonics to the ripples of the explanations that are near the best."""
-        ranked = self._ranked(count)
+        ranked = self._found.ranked(count)
         for fit in ranked[:_FINALISTS]:
-            near = self.misfit(fit) < _CLOSE * self.misfit(ranked[0])
+            near = self._found.misfit(fit) < _CLOSE * self._found.misfit(ranked[0])
             ripples = any(fx.EFFECTS[effect].ripple for effect in fit.effects)
-            if near and ripples and self.misfit(fit) > _WORTH_A_HARMONIC:
+            if near and ripples and self._found.misfit(fit) > _WORTH_A_HARMONIC:
                 self._progress(f"{' + '.join(fit.effects)}, second harmonic")
-                self._fits[fit.effects] = with_second_harmonics(self._fitter, fit)
-
-    def _ranked(self, count: int) -> list[Fit]:
-        """Return the converged fits of `count` effects, best first."""
-        fits = [fit for fit in self._fits.values() if len(fit.effects) == count and fit.converged]
-        return sorted(fits, key=self.misfit)
-
-    def _sure(self, count: int) -> list[Fit]:
-        """Return the converged fits of `count` effects none of which could be zero, best first."""
-        for effects, fit in self._fits.items():
-            if len(effects) == count:
-                self._fits[effects] = replace(fit, without=self._without(effects))
-        return [fit for fit in self._ranked(count) if sure(fit, self._groups)]
-
-    def _without(self, effects: Sequence[str]) -> dict[str, float]:
-        """Return the training chi-square of the fits that lack one of some effects."""
-        found = {}
-        for effect in effects:
-            rest = tuple(other for other in effects if other != effect)
-            fit = self._fits.get(rest) if rest else self._refit
-            if fit is not None and fit.converged:
-                found[effect] = fit.train_chi2
-        return found
-
-    def _all_ranked(self) -> tuple[Fit, ...]:
-        return tuple(sorted(self._fits.values(), key=lambda f: (not f.converged, self.misfit(f))))
-
-    def _calls_for(self, simple: Fit, rich: Fit, gain: float) -> bool:
-        """Whether the richer explanation is worth its effect: a gain on held-out data.
-
-        What gains on held-out data alone has only happened to extrapolate better.
-        """
-        before, after = self.misfit(simple), self.misfit(rich)
-        certain = before - after > CERTAIN / self._fitter.held.size
-        return certain and min(before / after, simple.train_chi2 / rich.train_chi2) > gain
-
-    def _explains(self, refit: Fit, best: Fit) -> bool:
-        left = self.misfit(best)
-        if not best.effects:
-            return left < PLAIN
-        if left < NOTHING_LEFT:
-            return True
-        motion = [self._fitter.held.left(fit.model) for fit in (best, refit)]
-        if motion[0] > MOST_LEFT * motion[1]:
-            return False
-        return stands_out(left, self.misfit(refit), self._next(refit, best)) > STANDS_OUT
-
-    def _next(self, refit: Fit, best: Fit) -> float:
-        """Return the misfit of the best explanation that does not stand for the chosen one.
-
-        A fit that was given up counts as well: it could only have become better.
-        """
-        alike = {*best.effects, *partners(best.effects, set(self._fitter.catalogue))}
-        others = [
-            fit
-            for fit in self._fits.values()
-            if len(fit.effects) == len(best.effects) and not set(fit.effects) <= alike
-        ]
-        return min(self.misfit(fit) for fit in (refit, *others))
+                self._found.fits[fit.effects] = with_second_harmonics(self._fitter, fit)
 
     def _effects_needed(self, best: Fit) -> int:
         """Search forward, backward and by swaps for a second effect; return how many to name."""
-        if self.misfit(best) < _WORTH_A_PAIR or self._owed_to_its_form(best):
+        if self._found.misfit(best) < _WORTH_A_PAIR or self._found.owed_to_its_form(best):
             return 1
-        for parent in self._ranked(1)[:2]:
-            if self.misfit(parent) < _NEAR * self.misfit(best):
+        for parent in self._found.ranked(1)[:2]:
+            if self._found.misfit(parent) < _NEAR * self._found.misfit(best):
                 others = [e for e in self._fitter.catalogue if e not in parent.effects]
                 self._extend(parent, others, _PROMISING_SECONDS)
-            if any(self.misfit(pair) < NOTHING_LEFT for pair in self._ranked(2)):
+            if any(self._found.misfit(pair) < NOTHING_LEFT for pair in self._found.ranked(2)):
                 break
         self._swap(best)
         self._polish(2)
         self._enrich(2)
-        if self._pair_called_for(best, self._ranked(2)):
+        if self._pair_called_for(best, self._found.ranked(2)):
             self._drop_scales()
-            best = self._sure(1)[0]
-        return 2 if self._pair_called_for(best, self._sure(2)) else 1
-
-    def _owed_to_its_form(self, best: Fit) -> bool:
-        """Tell whether an effect leaves no more of the gap than its law's form may be wrong by."""
-        assert self._refit is not None
-        return self.misfit(best) - 1.0 < _FORM * (self.misfit(self._refit) - 1.0)
+            best = self._found.sure(1)[0]
+        return 2 if self._pair_called_for(best, self._found.sure(2)) else 1
 
     def _pair_called_for(self, best: Fit, pairs: Sequence[Fit]) -> bool:
-        return bool(pairs) and self._calls_for(best, pairs[0], SECOND_GAIN)
+        return bool(pairs) and self._found.calls_for(best, pairs[0], SECOND_GAIN)
 
     def _drop_scales(self) -> None:
         """Drop pairs, near the best, in which one effect does no more than scale the parameters.
@@ -288,8 +209,12 @@ class Search:
         """
         tested: set[tuple[str, ...]] = set()
         while True:
-            pairs = self._ranked(2)
-            near = [fit for fit in pairs if self.misfit(fit) < _CLOSE * self.misfit(pairs[0])]
+            pairs = self._found.ranked(2)
+            near = [
+                fit
+                for fit in pairs
+                if self._found.misfit(fit) < _CLOSE * self._found.misfit(pairs[0])
+            ]
             left = [f for f in near if f.effects not in tested and set(f.effects) & set(SCALES)]
             if not left:
                 return
@@ -298,15 +223,15 @@ class Search:
             scale = next(effect for effect in SCALES if effect in pair.effects)
             self._progress(f"{' + '.join(pair.effects)}, parameters scaled instead")
             alone = without_scale(self._fitter, pair, scale)
-            if alone.converged and alone.train_chi2 < self._fits[alone.effects].train_chi2:
-                self._fits[alone.effects] = alone
-            if scale == "torque_gain" or not self._calls_for(alone, pair, SECOND_GAIN):
-                del self._fits[pair.effects]
+            if alone.converged and alone.train_chi2 < self._found.fits[alone.effects].train_chi2:
+                self._found.fits[alone.effects] = alone
+            if scale == "torque_gain" or not self._found.calls_for(alone, pair, SECOND_GAIN):
+                del self._found.fits[pair.effects]
 
     def _swap(self, best: Fit) -> None:
         """Fit the best pair with each member replaced by what is near it or holds it."""
-        pairs = self._ranked(2)
-        if not pairs or not self._calls_for(best, pairs[0], SECOND_GAIN):
+        pairs = self._found.ranked(2)
+        if not pairs or not self._found.calls_for(best, pairs[0], SECOND_GAIN):
             return
         for kept, swapped in (pairs[0].effects, pairs[0].effects[::-1]):
             alike = partners([swapped], set(self._fitter.catalogue) - {kept, swapped})
@@ -318,56 +243,27 @@ class Search:
     def _drop_holders(self, count: int) -> None:
         """Drop explanations by a law that nobody asked for where one of its parts does as well.
 
-        None of them leads then; see `_tied`.
+        None of them leads then; see `Ranking.tied`.
         """
-        for effects in [e for e in self._fits if len(e) == count]:
+        for effects in [e for e in self._found.fits if len(e) == count]:
             for held in (e for e in effects if e not in self._fitter.catalogue):
                 rest = [e for e in effects if e != held]
                 parts = (tuple(sorted((*rest, p))) for p in fx.EFFECTS[held].contains)
-                plain = [self._fits[p] for p in parts if p in self._fits]
-                if any(not self._calls_for(p, self._fits[effects], SECOND_GAIN) for p in plain):
-                    self._holding.append(self._fits.pop(effects))
+                plain = [self._found.fits[p] for p in parts if p in self._found.fits]
+                if any(
+                    not self._found.calls_for(p, self._found.fits[effects], SECOND_GAIN)
+                    for p in plain
+                ):
+                    self._found.holding.append(self._found.fits.pop(effects))
                     break
-
-    def _settled(self, count: int, near: float) -> set[tuple[str, ...]]:
-        """Return which explanations of `count` effects another start could not help."""
-        ranked = self._ranked(count)
-        best = min((fit.train_chi2 for fit in ranked), default=math.inf)
-        return {fit.effects for fit in ranked if fit.train_chi2 < near * best}
 
     def _polish(self, count: int) -> None:
         """Take fits further that have not converged but would lead, or stand for what leads."""
-        ranked = self._ranked(count)
+        ranked = self._found.ranked(count)
         best = min((fit.train_chi2 for fit in ranked), default=math.inf)
-        for effects, fit in list(self._fits.items()):
+        for effects, fit in list(self._found.fits.items()):
             stands = ranked and stands_for(effects, ranked[0].effects)
             limit = _NEAR * best if stands else best
             if len(effects) == count and not fit.converged and fit.train_chi2 < limit:
                 self._progress(f"{' + '.join(effects)}, further")
-                self._fits[effects] = self._fitter.continued(fit)
-
-    def _tied(self, best: Fit) -> tuple[Fit, ...]:
-        """Return the converged explanations of as many effects that do as well as the best.
-
-        One that only contains the best is no rival. But a law of several parts of which the best is
-        one may be what is there, where it gains what calls for an effect, if not the factor that it
-        takes to lead; or where it does as well and both look alike. Likewise a part of the best
-        that looks like it, if the form of its law may be all that it leaves.
-        """
-        if not best.effects:
-            return ()
-        limit = tie_limit(self.misfit(best), self._fitter.held.size)
-        rivals = [fit for fit in self._sure(len(best.effects)) if self.misfit(fit) < limit]
-        own = best.effects
-        others = [f for f in rivals if f.effects != own and not fx.contains(f.effects, own)]
-        for fit in self._holding:
-            as_well = stands_for(fit.effects, own) and self.misfit(fit) < limit
-            may_be = as_well or self._calls_for(best, fit, SMALL_GAIN)
-            if fx.contains(fit.effects, own) and may_be:
-                others.append(fit)
-        there = {fit.effects for fit in others}
-        for fit in self._ranked(len(own)):
-            part = fx.contains(own, fit.effects) and stands_for(fit.effects, own)
-            if part and fit.effects not in there and self._owed_to_its_form(fit):
-                others.append(fit)
-        return tuple(others)
+                self._found.fits[effects] = self._fitter.continued(fit)

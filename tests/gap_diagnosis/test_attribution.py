@@ -12,7 +12,7 @@ from fjr_records.noise import noise_levels
 from fjr_sim_node.plant import PLANT
 from gap_diagnosis.model.simulated_rig import Model, Simulator
 from gap_diagnosis.notes import unexplained
-from gap_diagnosis.which import search
+from gap_diagnosis.which import ranking
 from gap_diagnosis.which.attribution import STANDS_OUT, Attribution, stands_out
 from gap_diagnosis.which.fits import Fit, Fitter
 from gap_diagnosis.which.least_squares import Solution
@@ -82,7 +82,7 @@ def test_what_a_law_leaves_by_its_own_form_is_no_second_cause(monkeypatch):
     truth = {"actuator_lag.time_constant_s": 3e-3, "delay.time_s": 2.5e-4}
     few = ("actuator_lag", "delay")
     assert searched(truth, few).best.effects == ("actuator_lag",)
-    monkeypatch.setattr(search, "_FORM", 0.0)
+    monkeypatch.setattr(ranking, "_FORM", 0.0)
     assert set(searched(truth, few).best.effects) == set(few)
 
 
