@@ -13,13 +13,14 @@ from fjr_records.records import Record, RecordSet
 
 from .gates.bag_deviations import GROUPS
 from .gates.bags_gate import as_bags, record_changes, scattering
+from .kept_causes import kept
 from .model.evidence import Evidence
 from .model.record_torque import CONTINUOUS, with_continuous_torque
 from .model.simulated_rig import Model
 from .notes import at_limits
 from .outcome.diagnosis import Bags, Diagnosis
 from .outcome.verdict_words import OUT_OF_TIME
-from .record_judgement import FEWEST_PARTS, Tested, judge_records, tested_causes
+from .record_judgement import Tested, judge_records
 from .which.catalogue import catalogue
 from .which.cell_fits import CellFit, CellFitter
 from .which.equivalents import founded, partners
@@ -39,11 +40,6 @@ LEAST_SAMPLES = 64
 """Of each record: eight of the shortest windows."""
 LONGEST_S = 300.0
 """Of all records together, what is played at the most (s)."""
-
-
-_MAY_BE_UNSURE = 2
-SURE = 0.8
-"""How surely a cause beyond the two that gain most must be present."""
 
 _SEARCH_SHARE = 0.6
 """Of the budget for the search; the tests of what it found take about as long as one more step."""
@@ -107,7 +103,7 @@ def investigate_records(
     progress("scatter from run to run")
     bags, scatter, said = _run_scatter(fitter, found.best)
     heard += said
-    found, tested = _kept(fitter, found, scatter, progress)
+    found, tested = kept(fitter, found, scatter, progress)
     progress("what may stand in for a cause")
     alternatives = {t.effect: _alternatives(fitter, found, t, names) for t in tested}
     progress("judgement")
@@ -194,61 +190,6 @@ def _run_scatter(
     bags, seen = as_bags(changes, 0.0), scattering(changes)
     said = [f"What scatters from run to run: {seen}."] if seen else []
     return bags, relative_scatter(bags), said
-
-
-def _kept(
-    fitter: CellFitter, found: Found, scatter: Mapping[str, float], progress: Progress
-) -> tuple[Found, list[Tested]]:
-    """Take out, one at a time, the causes that do not pass the tests beside the others.
-
-    A cause whose size alone is not certain may be blurred by another one: then that goes which
-    gains least of all. Of those that pass, what is not sure goes as well, but for the two that gain
-    most. Where too little is held out, no cause is kept.
-    """
-    if len(fitter.evidence.parts_for("select")) < FEWEST_PARTS:
-        return replace(found, steps=found.steps[:1]), []
-    steps, tested = list(found.steps), []
-    if not steps[-1].solution.converged:
-        steps[-1] = fitter.further(steps[-1])
-    while steps[-1].effects:
-        progress(f"tests of {' + '.join(steps[-1].effects)}")
-        tested = tested_causes(fitter, steps[-1], steps[0], scatter)
-        failed = [t for t in tested if not t.passed] or _guesses(tested)
-        if not failed:
-            break
-        blurred = any(t.passes_beside_size and not t.certain for t in failed)
-        weakest = min(tested if blurred else failed, key=lambda t: t.gain.mean)
-        before = [fit for fit in steps if weakest.effect not in fit.effects]
-        last = weakest.without
-        steps = before if last.effects == before[-1].effects else [*before, last]
-        same = last.effects == before[-1].effects
-        if same and fitter.gains(last, before[-1]).sum() > 0.0:
-            steps[-1] = last
-        tested = []
-    if tested and any(len(fit.effects) != count for count, fit in enumerate(steps)):
-        steps = [steps[0], *_one_by_one(fitter, steps[-1], tested)]
-    return replace(found, steps=steps), tested
-
-
-def _one_by_one(fitter: CellFitter, fit: CellFit, tested: Sequence[Tested]) -> list[CellFit]:
-    """Return a fit reached cause after cause, what gains most first: each has one cause more."""
-    order = [t.effect for t in sorted(tested, key=lambda t: -t.gain.mean)]
-    without = {t.effect: t.without for t in tested}
-    fits = [fit]
-    for effect in order[:0:-1]:
-        fewer = without[effect] if fits[0] is fit else fitter.without(fits[0], effect)
-        fits.insert(0, fewer)
-    return [replace(one, effects=tuple(order[:count])) for count, one in enumerate(fits, 1)]
-
-
-def _guesses(tested: Sequence[Tested]) -> list[Tested]:
-    """Return the causes beyond the two that gain most of which one is not sure.
-
-    Each step tries the whole catalogue on what is left; the more steps, the likelier one of them
-    finds what resembles a part of the remainder.
-    """
-    further = sorted(tested, key=lambda t: -t.gain.mean)[_MAY_BE_UNSURE:]
-    return [t for t in further if t.present < SURE]
 
 
 def _alternatives(

@@ -9,9 +9,9 @@ import pytest
 from test_evidence import NOMINAL, SCATTER, records
 
 from gap_diagnosis import record_judgement
+from gap_diagnosis.kept_causes import SURE, _guesses, _one_by_one, kept
 from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.outcome.diagnosis import Estimate
-from gap_diagnosis.record_investigation import SURE, _guesses, _kept, _one_by_one
 from gap_diagnosis.which.cell_fits import CellFitter
 from gap_diagnosis.which.presence import beyond_zero
 from gap_diagnosis.which.stepwise import Found, Gain
@@ -36,7 +36,7 @@ def searched():
 
 def test_what_is_left_after_a_first_cause_was_taken_out_is_shown_cause_after_cause(searched):
     fitter, fits = searched
-    found, tested = _kept(fitter, Found(fits), SCATTER, lambda _: None)
+    found, tested = kept(fitter, Found(fits), SCATTER, lambda _: None)
     assert {t.effect for t in tested} == set(found.best.effects) == {"delay", "torque_bias"}
     assert [len(fit.effects) for fit in found.steps] == [0, 1, 2]
     first, both = (fit.model.effects for fit in found.steps[1:])

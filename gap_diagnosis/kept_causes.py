@@ -1,0 +1,80 @@
+"""Which of the causes that a search has found are kept: those that pass the tests of presence."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+from .record_judgement import FEWEST_PARTS, Tested, tested_causes
+from .which.cell_fits import CellFit, CellFitter
+from .which.stepwise import Found
+
+Progress = Callable[[str], None]
+
+_MAY_BE_UNSURE = 2
+SURE = 0.8
+"""How surely a cause beyond the two that gain most must be present."""
+
+
+def kept(
+    fitter: CellFitter, found: Found, scatter: Mapping[str, float], progress: Progress
+) -> tuple[Found, list[Tested]]:
+    """Take out, one at a time, the causes that do not pass the tests beside the others.
+
+    A cause whose size alone is not certain may be blurred by another one: then that goes which
+    gains least of all. Of those that pass, what is not sure goes as well, but for the two that gain
+    most. Where too little is held out, no cause is kept.
+
+    Args:
+        fitter: of the search.
+        found: what the search found.
+        scatter: of parameters from run to run, see `moved_by_scatter`.
+        progress: told what is tested.
+
+    Returns:
+        the steps that are left, and the tests of their causes.
+    """
+    if len(fitter.evidence.parts_for("select")) < FEWEST_PARTS:
+        return replace(found, steps=found.steps[:1]), []
+    steps, tested = list(found.steps), []
+    if not steps[-1].solution.converged:
+        steps[-1] = fitter.further(steps[-1])
+    while steps[-1].effects:
+        progress(f"tests of {' + '.join(steps[-1].effects)}")
+        tested = tested_causes(fitter, steps[-1], steps[0], scatter)
+        failed = [t for t in tested if not t.passed] or _guesses(tested)
+        if not failed:
+            break
+        blurred = any(t.passes_beside_size and not t.certain for t in failed)
+        weakest = min(tested if blurred else failed, key=lambda t: t.gain.mean)
+        before = [fit for fit in steps if weakest.effect not in fit.effects]
+        last = weakest.without
+        steps = before if last.effects == before[-1].effects else [*before, last]
+        same = last.effects == before[-1].effects
+        if same and fitter.gains(last, before[-1]).sum() > 0.0:
+            steps[-1] = last
+        tested = []
+    if tested and any(len(fit.effects) != count for count, fit in enumerate(steps)):
+        steps = [steps[0], *_one_by_one(fitter, steps[-1], tested)]
+    return replace(found, steps=steps), tested
+
+
+def _one_by_one(fitter: CellFitter, fit: CellFit, tested: Sequence[Tested]) -> list[CellFit]:
+    """Return a fit reached cause after cause, what gains most first: each has one cause more."""
+    order = [t.effect for t in sorted(tested, key=lambda t: -t.gain.mean)]
+    without = {t.effect: t.without for t in tested}
+    fits = [fit]
+    for effect in order[:0:-1]:
+        fewer = without[effect] if fits[0] is fit else fitter.without(fits[0], effect)
+        fits.insert(0, fewer)
+    return [replace(one, effects=tuple(order[:count])) for count, one in enumerate(fits, 1)]
+
+
+def _guesses(tested: Sequence[Tested]) -> list[Tested]:
+    """Return the causes beyond the two that gain most of which one is not sure.
+
+    Each step tries the whole catalogue on what is left; the more steps, the likelier one of them
+    finds what resembles a part of the remainder.
+    """
+    further = sorted(tested, key=lambda t: -t.gain.mean)[_MAY_BE_UNSURE:]
+    return [t for t in further if t.present < SURE]
