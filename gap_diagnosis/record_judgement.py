@@ -24,6 +24,7 @@ from .outcome.diagnosis import (
     Verdict,
 )
 from .which.cell_fits import CellFit, CellFitter
+from .which.gains import Gain, gain
 from .which.presence import (
     LEAST_INVARIANCE_P,
     at_its_bound,
@@ -32,7 +33,7 @@ from .which.presence import (
     invariance,
     where_it_acts,
 )
-from .which.stepwise import NOTHING_LEFT, Found, Gain, gain
+from .which.stepwise import NOTHING_LEFT, Found
 
 PLAIN = 4.0
 """The same for the refit where no effect gains anything."""

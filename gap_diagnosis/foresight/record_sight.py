@@ -12,8 +12,9 @@ from fjr_records.records import RecordSet
 
 from ..model.evidence import Evidence
 from ..model.simulated_rig import Model
+from ..which.gains import LEAST_GAIN
 from ..which.scales import Scales
-from ..which.stepwise import LEAST_GAIN, NOTHING_LEFT
+from ..which.stepwise import NOTHING_LEFT
 
 RECORDS = 3
 """Records of each level that are simulated: one for each purpose of a diagnosis."""

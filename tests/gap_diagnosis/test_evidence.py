@@ -23,8 +23,9 @@ from gap_diagnosis.outcome.diagnosis import Figure
 from gap_diagnosis.which import unseen_friction
 from gap_diagnosis.which.cell_fits import CellFitter
 from gap_diagnosis.which.cell_weights import independent
+from gap_diagnosis.which.gains import Gain, gain
 from gap_diagnosis.which.presence import at_its_bound, beyond_zero, cell_estimates, invariance
-from gap_diagnosis.which.stepwise import Gain, Stepwise, gain
+from gap_diagnosis.which.stepwise import Stepwise
 
 RATE, NOISE = 500.0, 2e-5
 LAW = pd_filtered.CONTROLLER.check({"sample_rate_hz": RATE})

@@ -13,8 +13,9 @@ from gap_diagnosis.kept_causes import SURE, _guesses, _one_by_one, kept
 from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.outcome.diagnosis import Estimate
 from gap_diagnosis.which.cell_fits import CellFitter
+from gap_diagnosis.which.gains import Gain
 from gap_diagnosis.which.presence import beyond_zero
-from gap_diagnosis.which.stepwise import Found, Gain
+from gap_diagnosis.which.stepwise import Found
 
 CAUSES = {"torque_bias.torque_nm": 4.0, "delay.time_s": 1e-3}
 

@@ -10,8 +10,8 @@ from test_evidence import NOMINAL, records
 
 from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.model.simulated_rig import Model
-from gap_diagnosis.which import stepwise
 from gap_diagnosis.which.cell_fits import CellFitter
+from gap_diagnosis.which.gains import gain
 from gap_diagnosis.which.unseen_friction import SCATTER, beside_scatter, deviated
 
 STEP = 0.01
@@ -79,7 +79,7 @@ def test_a_small_offset_is_there_on_runs_whose_friction_differs(monkeypatch):
             refit = fitter.refit()
             proposals = fitter.screening(refit, "torque_bias").proposals()
             fit = fitter.add(refit, "torque_bias", proposals) if proposals else None
-            shown[beside] += fit is not None and stepwise.gain(fitter, fit, refit).present
+            shown[beside] += fit is not None and gain(fitter, fit, refit).present
     assert shown[True] == 4 and shown[False] <= 1
 
 
@@ -92,4 +92,4 @@ def test_few_parts_show_an_effect_if_all_of_them_do(gains, there, monkeypatch):
     change[: len(gains)] = gains
     monkeypatch.setattr(CellFitter, "gains", lambda self, after, before: change)
     fitter = object.__new__(CellFitter)
-    assert stepwise.gain(fitter, None, None, change != 0.0).present == there
+    assert gain(fitter, None, None, change != 0.0).present == there

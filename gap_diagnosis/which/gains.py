@@ -1,0 +1,107 @@
+"""What one explanation gains over another on parts that no fit has seen, and whether it repeats."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from .cell_fits import CellFit, CellFitter
+
+LEAST_GAIN = 1.0
+"""Least mean gain of log-likelihood of an unseen part (nats)."""
+LEAST_SHARE = 0.75
+"""Least share of the ranks that the parts which gain must hold."""
+MOST_P = 0.05
+"""Greatest p-value of the signed-rank test that parts gain as often and as much as they lose."""
+TIED_SHARE = 0.15
+"""An effect stands for another if it is behind by less than this share of the other's gain..."""
+TIED_P = 0.1
+"""...or by less than half of it and unseen parts do not show the difference."""
+
+
+_FEW = 5  # parts: of fewer no rank test is sure
+_COUNTED = 5.0  # nats, the most that one of few parts counts
+_NEUTRAL = 0.02  # of the greatest gain of a part: parts that change by less say nothing
+
+
+@dataclass(frozen=True)
+class Gain:
+    """What one explanation gains over another on unseen parts.
+
+    Attributes:
+        mean: mean over unseen parts of the log-likelihood gained (nats).
+        without_best: the same without the part that gains most.
+        share: of the parts that gain in the sum of ranks, ranked by how much each changes: a part
+            at rest shows little but where friction happened to stop the motion.
+        p: p-value of these parts against no gain, see `_p_value`.
+    """
+
+    mean: float
+    without_best: float
+    share: float
+    p: float
+
+    @property
+    def present(self) -> bool:
+        """Whether it repeats, and is not the sum by one part."""
+        repeats = self.share >= LEAST_SHARE and self.p <= MOST_P
+        return min(self.mean, 3.0 * self.without_best) > LEAST_GAIN and repeats
+
+
+def gain(
+    fitter: CellFitter, after: CellFit, before: CellFit, acts: np.ndarray | None = None
+) -> Gain:
+    """Return what `after` gains over `before` on the parts that select.
+
+    Args:
+        fitter: that made both.
+        after: the fit that may be better.
+        before: the other one.
+        acts: bool (parts,), where it must repeat; None for all parts in which anything changes.
+    """
+    difference = fitter.gains(after, before)
+    telling = difference[np.abs(difference) >= _NEUTRAL * np.abs(difference).max()]
+    if acts is not None:
+        telling = difference[acts]
+    if difference.size < 2 or not telling.any():
+        return Gain(float(difference.mean()), 0.0, 0.0, 1.0)
+    most = int(np.argmax(difference))
+    ranks = stats.rankdata(np.abs(telling))
+    return Gain(
+        float(difference.mean()),
+        float(np.delete(difference, most).mean()),
+        float(ranks[telling > 0.0].sum() / ranks.sum()),
+        _p_value(telling),
+    )
+
+
+def _p_value(gains: np.ndarray) -> float:
+    """Return how often chance makes unseen parts gain as often and as much as they do.
+
+    By Wilcoxon's signed-rank test. An effect that acts in few parts, such as a limit that is
+    reached twice, cannot pass that however much these gain: all of them must gain then, and the
+    likelihood ratio on unseen parts, to which each adds a bounded amount, is an e-value, whose
+    inverse bounds the p-value (Vovk, Wang 2021, Annals of Statistics 49(3)).
+
+    Args:
+        gains: of log-likelihood, nats.
+    """
+    if gains.size >= _FEW:
+        return float(stats.wilcoxon(gains, alternative="greater").pvalue)
+    if gains.min() <= 0.0:
+        return 1.0
+    return float(np.exp(-np.minimum(gains, _COUNTED).sum()))
+
+
+def stands_for(behind: Gain, first: float) -> bool:
+    """Tell whether unseen parts cannot tell an explanation from a better one.
+
+    Args:
+        behind: what the better one gains over it.
+        first: mean gain of the better one's cause.
+    """
+    if behind.mean < TIED_SHARE * first:
+        return True
+    return behind.p > TIED_P and behind.mean < 0.5 * first
