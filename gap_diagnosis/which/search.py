@@ -58,11 +58,7 @@ class Search:
         with the fewest parameters. What cannot be told from zero has no name.
         """
         ranked = self._found.sure(count)
-        close = [
-            f
-            for f in ranked[:_FINALISTS]
-            if self._found.misfit(f) < _CLOSE * self._found.misfit(ranked[0])
-        ]
+        close = self._found.close(ranked[:_FINALISTS], _CLOSE)
         if len(close) < 2:
             return ranked[0] if ranked else None
         scores = []
@@ -172,11 +168,9 @@ class Search:
 
     def _enrich(self, count: int) -> None:
         """Give second harmonics to the ripples of the explanations that are near the best."""
-        ranked = self._found.ranked(count)
-        for fit in ranked[:_FINALISTS]:
-            near = self._found.misfit(fit) < _CLOSE * self._found.misfit(ranked[0])
+        for fit in self._found.close(self._found.ranked(count)[:_FINALISTS], _CLOSE):
             ripples = any(fx.EFFECTS[effect].ripple for effect in fit.effects)
-            if near and ripples and self._found.misfit(fit) > _WORTH_A_HARMONIC:
+            if ripples and self._found.misfit(fit) > _WORTH_A_HARMONIC:
                 self._progress(f"{' + '.join(fit.effects)}, second harmonic")
                 self._found.fits[fit.effects] = with_second_harmonics(self._fitter, fit)
 
@@ -210,11 +204,7 @@ class Search:
         tested: set[tuple[str, ...]] = set()
         while True:
             pairs = self._found.ranked(2)
-            near = [
-                fit
-                for fit in pairs
-                if self._found.misfit(fit) < _CLOSE * self._found.misfit(pairs[0])
-            ]
+            near = self._found.close(pairs, _CLOSE)
             left = [f for f in near if f.effects not in tested and set(f.effects) & set(SCALES)]
             if not left:
                 return
