@@ -44,6 +44,9 @@ class HandRecorder(Recorder):
         self.samples = 0
         self.newest_ns = [0] * len(self.signals)
         self.late = False
+        self._runs = [0] * len(self.signals)  # which run each signal is in, as far as it was read
+        self._inside = [False] * len(self.signals)  # whether the beginning of that run is read
+        self._next = 0  # the first run that may be whole
 
     @property
     def experiment(self) -> Experiment:
@@ -77,6 +80,8 @@ class HandRecorder(Recorder):
         self._folder = bag_folder(self._out, experiment.level, experiment.realization)
         self._stamps = experiment.stamps_ns.tolist()
         self._first = _bytes(stamp_ns(1, experiment.sample_rate_hz))
+        if self.samples:
+            self._inside = [True] * len(self.signals)
         self.samples = 0
         self._writer = BagWriter(self._folder, experiment, signals=self.signals)
 
@@ -102,11 +107,29 @@ class HandRecorder(Recorder):
         )
 
     def _pass_over(self) -> None:
-        """Leave out what came before the first sample of each signal."""
-        for queue in self._queues:
-            while queue and queue[0][STAMP] != self._first:
-                queue.popleft()
-                self.late = True
+        """Leave out what came before the first sample of each signal.
+
+        A run of which one signal lacks its first sample is left out in all signals: a node whose
+        publisher was known later than that of another one has begun without this recorder.
+        """
+        before = -1
+        while before != self._next:
+            before = self._next
+            for index in range(len(self.signals)):
+                self._pass_over_in(index)
+
+    def _pass_over_in(self, index: int) -> None:
+        queue = self._queues[index]
+        while queue:
+            begins = queue[0][STAMP] == self._first
+            if begins and self._inside[index]:
+                self._runs[index] += 1
+                self._inside[index] = False
+            if begins and self._runs[index] >= self._next:
+                return
+            queue.popleft()
+            self._inside[index] = self.late = True
+            self._next = max(self._next, self._runs[index] + 1)
 
 
 def record_by_hand(
@@ -191,8 +214,13 @@ def _waits_for(recorder: HandRecorder) -> str:
         return f"Waiting for the description of a realization on {recorder.description_topic}."
     if recorder.samples:
         return f"Sample {recorder.samples + 1} does not come; `fjr status` says who is missing."
-    begun = "" if recorder.late else "if the realization has begun, "
-    return f"Waiting for the first sample; {begun}`fjr reset` plays it from its beginning."
+    reset = "`fjr reset` plays it from its beginning"
+    if not recorder.late:
+        return f"Waiting for the first sample; if the realization has begun, {reset}."
+    return (
+        f"Waiting for the first sample; {reset}. It began before all nodes knew this recorder: "
+        "-p readers:=controller,recorder makes the excitation wait for one."
+    )
 
 
 def _refuse_trip(recorder: HandRecorder, namespace: str) -> None:

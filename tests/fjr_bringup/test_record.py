@@ -15,6 +15,8 @@ from processes import wait_for
 from fjr_interface.bags.reader import BagReader, read_record
 from fjr_interface.bags.topic_survey import survey_bag
 from fjr_interface.bags.writer import keep_whole_periods
+from fjr_interface.ros.runtime import EXPERIMENT_QOS, SIGNAL_QOS
+from fjr_interface.topics import EXPERIMENT_TOPIC, SIGNALS
 from fjr_sim_node.simulation.simulator import SIMULATOR, run_realization
 
 BAG = "level_0_realization_000"
@@ -92,6 +94,41 @@ def test_ctrl_c_keeps_whole_periods_and_a_late_recorder_waits(start, domain: int
     fjr(start, "reset")
     assert late.exit_status() == 0, late.output
     assert BagReader(tmp_path / "late" / BAG).experiment == described(periods=9)
+
+
+@pytest.mark.parametrize("missed", ["reference", "motor_position"])
+def test_a_run_of_which_one_signal_lacks_its_first_sample_is_passed_over_in_all(
+    start, peer, tmp_path: Path, missed: str
+):
+    """As where the recorder got to know one node a moment later than the others."""
+    from sensor_msgs.msg import JointState
+    from std_msgs.msg import String
+
+    described = experiment()
+    signals = {
+        signal.topic: peer.node.create_publisher(JointState, f"/rig/{signal.topic}", SIGNAL_QOS)
+        for signal in SIGNALS
+    }
+    about = peer.node.create_publisher(String, f"/rig/{EXPERIMENT_TOPIC}", EXPERIMENT_QOS)
+    recorder = start("fjr_cli", "record", "--out", str(tmp_path / "rig"))
+    known = (*signals.values(), about)
+    peer.spin_until(lambda: all(p.get_subscription_count() for p in known), "the recorder")
+
+    def play(value: float, lost: str = "") -> None:
+        about.publish(String(data=described.to_json()))
+        for k, stamp in enumerate(described.stamps_ns.tolist()):
+            for signal in SIGNALS:
+                if k or signal.topic != lost:
+                    fields = dict.fromkeys(["position", "effort"], value + k)
+                    signals[signal.topic].publish(joint_state(stamp, **fields))
+
+    play(0.0, missed)
+    recorder.wait_for_text("readers:=controller,recorder")
+    play(100.0)
+    assert recorder.exit_status() == 0, recorder.output
+    record = read_record(tmp_path / "rig" / BAG)
+    for values in (record.reference, record.torque, record.position):
+        assert values.tolist() == [100.0 + k for k in range(described.samples)]
 
 
 def test_topics_of_another_rig_are_recorded_with_their_qos(start, peer, tmp_path: Path):
