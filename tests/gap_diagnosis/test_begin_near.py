@@ -39,7 +39,7 @@ def test_the_steady_period_is_that_from_rest(case, name):
     models = [Model(bent, EFFECTS[name])]
     from_rest, begun = cold.many(models), near.many(models)
     off = np.sqrt(np.mean((begun - from_rest) ** 2) / np.mean(from_rest**2))
-    assert 0.0 < off < 5e-4  # half of what the simulation itself may be wrong by
+    assert 0.0 < off < 1e-4
 
 
 def test_less_is_simulated(case):

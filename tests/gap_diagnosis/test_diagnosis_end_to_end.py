@@ -127,7 +127,7 @@ def test_what_too_few_data_cannot_say_is_said_and_the_rest_goes_on(run, what, tm
     diagnosis = Diagnosis.read(tmp_path / "out" / "diagnosis.json")
     assert any(words in note for note in diagnosis.notes), diagnosis.notes
     assert words in " ".join(done.stdout.split())
-    assert diagnosis.verdict in ("effect", "ambiguous", "partly_explained")
+    assert diagnosis.verdict in ("effect", "ambiguous")
     assert "backlash" in diagnosis.equivalent[0]
     assert (text["gap"]["noise_floor"] is None) == (what == "one period")
     if what == "one realization":  # no run to hold out, but blocks of runs
