@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -16,6 +16,8 @@ harmonic is the size of an optional second harmonic; an angle turns and has no s
 cycles count ripples per turn."""
 Start = Mapping[str, tuple[float, ...]]
 """Starting values by parameter name; all combinations are tried."""
+FromPart = Callable[[Mapping[str, float], Mapping[str, float]], dict[str, float]]
+"""Takes effect parameters by full name and bare parameters; returns effect parameters."""
 
 
 @dataclass(frozen=True)
@@ -84,6 +86,8 @@ class Effect:
         ripple: whether it is periodic in the motor angle, so that `cycles_per_turn` is searched.
         scales: whether it scales the parameters of the bare plant, wholly or about one angle.
         contains: effects that it holds as limit cases, which explain what they can with less.
+        from_part: where its fit begins if one of what it holds was fitted: its parameters by full
+            name, from the parameters of that fit's effects and of its bare plant; None: as without.
         rarer_than: the commoner effect that is named where the data cannot tell it from this one.
         modifies: the effect that brings in what this one changes, so that a rig which lacks that
             has nothing to change; empty if it stands by itself.
@@ -108,6 +112,7 @@ class Effect:
     ripple: bool = False
     scales: bool = False
     contains: tuple[str, ...] = ()
+    from_part: FromPart | None = None
     rarer_than: str = ""
     modifies: str = ""
     on_request: bool = False

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 from .entry import Effect, EffectParameter, Start, ripple, ripple_starts, size
 
@@ -35,6 +36,17 @@ def _on_either_side(name: str, values: tuple[float, ...]) -> tuple[Start, ...]:
     motor, link = f"motor_{name}", f"link_{name}"
     both = tuple({motor: (value,), link: (value,)} for value in values)
     return ({motor: values, link: (0.0,)}, {motor: (0.0,), link: values}, *both)
+
+
+def _lugre_from_part(effects: Mapping[str, float], plant: Mapping[str, float]) -> dict[str, float]:
+    """Return the bristles of presliding friction, or level and velocity of Stribeck friction."""
+    found = {}
+    if bent := effects.get("presliding_friction.motor_rad"):
+        found["bristle_nm_rad"] = plant["fsm"] / bent
+    if level := effects.get("stribeck_friction_motor.torque_nm"):
+        velocity = effects["stribeck_friction_motor.velocity_rad_s"]
+        found |= {"stribeck_nm": level, "velocity_rad_s": velocity}
+    return {f"lugre_friction.{name}": value for name, value in found.items()}
 
 
 FRICTION: tuple[Effect, ...] = (
@@ -141,10 +153,11 @@ FRICTION: tuple[Effect, ...] = (
         ),
         (
             {"stribeck_nm": (0.01,), "bristle_nm_rad": (1.0, 10.0),
-             "velocity_rad_s": (0.0025, 0.0125, 0.06), "damping_nm_s_rad": (0.005,)},
+             "velocity_rad_s": (0.0025, 0.0125, 0.06, 0.3), "damping_nm_s_rad": (0.005,)},
         ),
         looks_like="friction that builds up",
         contains=("stribeck_friction_motor", "presliding_friction"),
+        from_part=_lugre_from_part,
         on_request=True,
         modifies="coulomb_friction",
     ),

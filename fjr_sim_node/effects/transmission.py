@@ -148,7 +148,10 @@ TRANSMISSION: tuple[Effect, ...] = (
             EffectParameter("rest_rad", 0.0, "rad", "Angle of the link at which it pulls nowhere",
                             -1e4, 1e4, fit=(-30.0, 30.0)),
         ),
-        ({"stiffness_nm_rad": (0.01, 0.1), "rest_rad": (0.0,)},),
+        (
+            {"stiffness_nm_rad": (0.01, 0.1), "rest_rad": (0.0,)},
+            {"stiffness_nm_rad": (0.01,), "rest_rad": (-3.0, 3.0)},
+        ),
         looks_like="constant torque",
         rarer_than="gravity",
         axis="both",

@@ -21,6 +21,7 @@ from fjr_sim_node import effects as fx
 from ..model.evidence import Evidence
 from ..model.simulated_rig import Model
 from .cell_weights import CellWeights
+from .from_parts import from_part
 from .least_squares import Solution, solve
 from .ripples_of_records import RecordRipples
 from .ripples_seen import SeenRipples
@@ -113,10 +114,26 @@ class CellFitter:
                 predicted.cycles(effect, tried, RIPPLES_TRIED),
                 along.seeds(effect, tried),
             )
+        seeds = [*starts(effect, self.scales, cycles, self.nominal), *seen]
+        return self._started(parent, seeds)
+
+    def _started(self, parent: CellFit, seeds: Sequence[Mapping[str, float]]) -> Screening:
         return Screening(
             parent.solution,
             parent.model,
-            [*starts(effect, self.scales, cycles, self.nominal), *seen],
+            seeds,
+            partial(self._space, parent),
+            partial(self._residuals, parent.variance),
+            partial(self.weights.costs, parent.variance),
+        )
+
+    def from_part(self, parent: CellFit, whole: str, fit: CellFit) -> list[Proposal]:
+        """Return starts of a law beside a fit, from a fit that has one of its parts more."""
+        return from_part(
+            whole,
+            fit.effects[-1],
+            fit.model,
+            starts(whole, self.scales, None, self.nominal),
             partial(self._space, parent),
             partial(self._residuals, parent.variance),
             partial(self.weights.costs, parent.variance),
@@ -163,6 +180,18 @@ class CellFitter:
             if best is None or self.gains(fit, best).sum() > 0.0:
                 best = fit
         return None if best is None else replace(best, acts=self.acted(best, effect))
+
+    def second_harmonic(self, fit: CellFit, ripple: str) -> CellFit | None:
+        """Return a fit with a second harmonic of one of its ripples; None if none promises any.
+
+        Args:
+            fit: an explanation.
+            ripple: identifier of an angle-periodic effect of it, of one harmonic so far.
+        """
+        ratio, phase = f"{ripple}.second_ratio", f"{ripple}.second_phase_rad"
+        seeds = [{ratio: 0.2, phase: angle} for angle in (0.0, 0.5 * math.pi)]
+        found = self.add(fit, ripple, self._started(fit, seeds).proposals(), 1)
+        return None if found is None else replace(found, effects=fit.effects)
 
     def begun(self, parent: CellFit) -> float:
         """Return what a fit costs itself, as its proposals do."""

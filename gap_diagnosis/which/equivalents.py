@@ -10,6 +10,10 @@ SCALES = tuple(effect.identifier for effect in fx.CATALOGUE if effect.scales)
 """Effects that scale the base parameters: a gain of the torque does nothing else, and is no second
 cause whatever it gains; an eccentric encoder has a gain about its zero, and may do more."""
 
+ONE_CAUSE = 0.04
+"""Of the gap, beyond noise: where one of two near equivalents leaves no more alone, both together
+are one cause whose law has another form than the catalogue's, by up to a fifth of what it does."""
+
 
 def partners(found: Sequence[str], among: set[str]) -> list[str]:
     """Return the near equivalents of effects, so that a set is never short of one not tried."""

@@ -14,6 +14,7 @@ from fjr_sim_node import effects as fx
 from ..model.misfit import Misfit
 from ..model.simulated_rig import Model, Simulator
 from .catalogue import catalogue
+from .from_parts import from_part
 from .least_squares import Solution, solve
 from .ripples import RippleSearch
 from .screening import Costs, Proposal, Screening, sums_of_squares
@@ -184,6 +185,12 @@ class Fitter:
             self._screened.errors,
             self._costs_of_few(parent, solution),
         )
+
+    def from_part(self, parent: Fit, whole: str, fit: Fit) -> list[Proposal]:
+        """Return starts of a law beside a fit, from a fit that has one of its parts more."""
+        (part,) = set(fit.effects) - set(parent.effects)
+        seeds, space = starts(whole, self.scales, None, self.nominal), partial(self.space, parent)
+        return from_part(whole, part, fit.model, seeds, space, self.errors, sums_of_squares)
 
     def promise(self, screened: Screening, parent: Fit) -> float:
         """Return what an effect promises beside a fit, by a screening beside another one."""

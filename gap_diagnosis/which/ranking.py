@@ -18,7 +18,7 @@ from .attribution import (
     stands_out,
     tie_limit,
 )
-from .equivalents import partners, stands_for
+from .equivalents import ONE_CAUSE, partners, stands_for
 from .estimates import sure as known
 from .fits import Fit, Fitter
 
@@ -112,8 +112,19 @@ class Ranking:
 
     def owed_to_its_form(self, best: Fit) -> bool:
         """Tell whether an effect leaves no more of the gap than its law's form may be wrong by."""
+        return self._leaves(best) < _FORM
+
+    def _leaves(self, fit: Fit) -> float:
+        """Return what a fit leaves of the gap, beyond noise."""
         assert self.refit is not None
-        return self.misfit(best) - 1.0 < _FORM * (self.misfit(self.refit) - 1.0)
+        return (self.misfit(fit) - 1.0) / max(self.misfit(self.refit) - 1.0, 1e-300)
+
+    def drop_one_cause_twice(self) -> None:
+        """Drop pairs of near equivalents of which one alone does nearly all; see `ONE_CAUSE`."""
+        for fit in self.ranked(1):
+            if self._leaves(fit) < ONE_CAUSE:
+                for other in fx.near_equivalents(fit.effects[0]):
+                    self.fits.pop(tuple(sorted((*fit.effects, other))), None)
 
     def settled(self, count: int, near: float) -> set[tuple[str, ...]]:
         """Return which explanations of `count` effects another start could not help."""

@@ -19,7 +19,7 @@ from .fits import Fit, Fitter
 from .harmonics import with_second_harmonics
 from .ranking import Ranking
 from .reduced_fits import without, without_scale
-from .screening import Screening
+from .screening import Proposal, Screening
 
 _FINALISTS = 4
 _CLOSE = 2.0
@@ -130,11 +130,18 @@ class Search:
                 limit = min(limit, parent.train_chi2 / _SECOND_PROMISE)
             if effect not in names:  # a law of several parts has to do better than its best part
                 limit = min(limit, least)
-            fit = self._fitter.add(parent, effect, proposals[effect], limit)
+            begun = [*self._from_parts(parent, effect), *proposals[effect]]
+            fit = self._fitter.add(parent, effect, sorted(begun, key=lambda p: p[0]), limit)
             key = fit.effects
             if key not in self._found.fits or fit.train_chi2 < self._found.fits[key].train_chi2:
                 self._found.fits[key] = fit
             least = min(least, fit.train_chi2)
+
+    def _from_parts(self, parent: Fit, whole: str) -> list[Proposal]:
+        """Return starts of a law from the fits that have one of its parts beside a parent."""
+        keys = (tuple(sorted((*parent.effects, part))) for part in fx.EFFECTS[whole].contains)
+        fits = [self._found.fits[key] for key in keys if key in self._found.fits]
+        return [start for fit in fits for start in self._fitter.from_part(parent, whole, fit)]
 
     def _screenings(
         self, parent: Fit, effects: Sequence[str], most: int | None
@@ -182,10 +189,12 @@ class Search:
             if self._found.misfit(parent) < _NEAR * self._found.misfit(best):
                 others = [e for e in self._fitter.catalogue if e not in parent.effects]
                 self._extend(parent, others, _PROMISING_SECONDS)
+            self._found.drop_one_cause_twice()
             if any(self._found.misfit(pair) < NOTHING_LEFT for pair in self._found.ranked(2)):
                 break
         self._swap(best)
         self._polish(2)
+        self._found.drop_one_cause_twice()
         self._enrich(2)
         if self._pair_called_for(best, self._found.ranked(2)):
             self._drop_scales()

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from fjr_sim_node import effects as fx
 
 from .cell_fits import CellFit, CellFitter
-from .equivalents import founded, holders, partners
+from .equivalents import ONE_CAUSE, founded, holders, partners
 from .gains import Gain, gain, stands_for
 from .screening import Proposal, Screening
 
@@ -22,6 +22,7 @@ _PROPOSED, _FITTED, _STARTS = (7, 5), (5, 3), (2, 1)
 """Effects that are tried at several sizes, those of them that are fitted, and from how many starts:
 beside no cause yet, beside others."""
 _POLISHED = 2  # leading fits of a step that are taken further
+_WORTH_A_HARMONIC = 1.3  # a misfit: what noise leaves is no second harmonic
 _AGAIN = 8  # effects without ripple that are screened beside a cause
 _OUTDATED = 0.1  # of the squared error that is left: then what was screened before is too far
 NOTHING_LEFT = 2.0
@@ -90,7 +91,7 @@ class Stepwise:
             if self._over:
                 found.complete = False
                 break
-            fits = self._extended(found.best)
+            fits = self._extended(found.best, found.steps[0])
             found.rivals[len(found.best.effects) + 1] = fits
             chosen = self._chosen(fits, found.best)
             if chosen is None or self._fitter.closed(chosen, found.best) < self._least_closed(
@@ -110,10 +111,11 @@ class Stepwise:
         """Return how much of its best band a further cause must close to be named in the end."""
         return LEAST_CLOSED if len(found.best.effects) < _CERTAIN_CAUSES else LEAST_CLOSED_LATER
 
-    def _extended(self, parent: CellFit) -> list[CellFit]:
+    def _extended(self, parent: CellFit, refit: CellFit) -> list[CellFit]:
         """Return the parent with each promising effect more, best on unseen parts first."""
         names, nominal = self._effects, self._fitter.nominal
-        effects = [e for e in names if e not in parent.effects]
+        there = {*parent.effects, *self._one_cause(parent, refit)}
+        effects = [e for e in names if e not in there]
         effects = founded(effects, parent.effects, nominal, names)
         screened = self._screened(parent, effects)
         later = bool(parent.effects)
@@ -128,14 +130,17 @@ class Stepwise:
                 again = screened.get(effect) or self._fitter.screening(parent, effect)
                 proposals[effect] = again.proposals()
             chosen.append(effect)
-        fits = []
+        fits: list[CellFit] = []
         for number, effect in enumerate(chosen, 1):
             self._progress(f"{' + '.join((*parent.effects, effect))} ({number} of {len(chosen)})")
-            fit = self._fitter.add(parent, effect, proposals[effect], _STARTS[later])
+            parts = [f for f in fits if f.effects[-1] in fx.EFFECTS[effect].contains]
+            begun = [p for f in parts for p in self._fitter.from_part(parent, effect, f)]
+            begun = sorted([*begun, *proposals[effect]], key=lambda p: p[0])
+            fit = self._fitter.add(parent, effect, begun, _STARTS[later])
             if fit is not None:
                 fits.append(fit)
         fits = self._ranked(fits, parent)
-        leading = [self._settled(fit) for fit in fits[:_POLISHED]]
+        leading = [self._enriched(self._settled(fit)) for fit in fits[:_POLISHED]]
         return self._ranked([*leading, *fits[_POLISHED:]], parent)
 
     def _worth_a_fit(
@@ -158,6 +163,23 @@ class Stepwise:
             return fit
         self._progress(f"{' + '.join(fit.effects)}, further")
         return self._fitter.further(fit)
+
+    def _enriched(self, fit: CellFit) -> CellFit:
+        """Return a fit whose last effect is a ripple with its second harmonic, if that repeats.
+
+        A ripple of two harmonics that is taken for one leaves what looks like a further cause.
+        """
+        effect = fit.effects[-1]
+        if not fx.EFFECTS[effect].ripple or self._fitter.misfit(fit) < _WORTH_A_HARMONIC:
+            return fit
+        self._progress(f"{' + '.join(fit.effects)}, second harmonic")
+        richer = self._fitter.second_harmonic(fit, effect)
+        return fit if richer is None or not self._gain(richer, fit).present else richer
+
+    def _one_cause(self, parent: CellFit, refit: CellFit) -> list[str]:
+        """Return what could only name a cause of the parent twice; see `ONE_CAUSE`."""
+        left, gap = self._fitter.misfit(parent) - 1.0, self._fitter.misfit(refit) - 1.0
+        return partners(parent.effects, set(self._effects)) if left < ONE_CAUSE * gap else []
 
     def _screened(self, parent: CellFit, effects: Sequence[str]) -> dict[str, Screening]:
         """Return screenings beside a fit: of all effects the first time, then of those that count.

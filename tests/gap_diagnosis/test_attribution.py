@@ -83,7 +83,21 @@ def test_what_a_law_leaves_by_its_own_form_is_no_second_cause(monkeypatch):
     few = ("actuator_lag", "delay")
     assert searched(truth, few).best.effects == ("actuator_lag",)
     monkeypatch.setattr(ranking, "_FORM", 0.0)
+    assert searched(truth, few).best.effects == ("actuator_lag",)  # near equivalents, one cause
+    monkeypatch.setattr(ranking, "ONE_CAUSE", 0.0)
     assert set(searched(truth, few).best.effects) == set(few)
+
+
+def test_near_equivalents_of_like_size_are_two_causes():
+    """A constant torque beside a cogging that does as much: neither alone does nearly all."""
+    cogging = {
+        "cogging.amplitude_nm": 2.0,
+        "cogging.cycles_per_turn": 60.0,
+        "cogging.phase_rad": 0.7,
+    }
+    few = ("cogging", "torque_bias")
+    found = searched(cogging | {"torque_bias.torque_nm": 3.0}, few)
+    assert set(found.best.effects) == set(few)
 
 
 def test_an_offset_counts_by_how_far_the_rig_is_moved():

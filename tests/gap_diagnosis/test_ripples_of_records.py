@@ -9,6 +9,7 @@ from test_evidence import NOMINAL, RATE, records
 from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.which.cell_fits import CellFitter
 from gap_diagnosis.which.ripples_of_records import _averaged
+from gap_diagnosis.which.stepwise import Stepwise
 
 CASES = {
     "position_friction": ({"amplitude_nm": 1.5, "cycles_per_turn": 30.0, "phase_rad": 0.7}, 2.0),
@@ -32,6 +33,32 @@ def test_ripples_are_proposed_near_enough_for_the_fit_to_find_them(effect):
     fit = fitter.add(refit, effect, fitter.screening(refit, effect).proposals())
     found = fit.model.effects[f"{effect}.cycles_per_turn"]
     assert found == pytest.approx(truth["cycles_per_turn"], rel=0.01)
+
+
+def test_a_ripple_of_two_harmonics_is_found_as_one_cause():
+    """Taken for one harmonic its number of cycles is off, and the rest looks like another cause."""
+    truth = {
+        "cogging.amplitude_nm": 1.5,
+        "cogging.cycles_per_turn": 40.0,
+        "cogging.phase_rad": 0.7,
+        "cogging.second_ratio": 0.5,
+        "cogging.second_phase_rad": -1.0,
+    }
+    fitter = CellFitter(Evidence(records(truth, runs=2), NOMINAL), NOMINAL, 0.1)
+    refit = fitter.refit()
+    found = Stepwise(fitter, ["cogging", "torque_bias", "asymmetric_friction"]).run(refit)
+    assert found.best.effects == ("cogging",)
+    for name, value in truth.items():
+        assert found.best.model.effects[name] == pytest.approx(value, rel=0.05)
+    assert fitter.misfit(found.best) < 1.3
+
+
+def test_a_ripple_of_one_harmonic_gets_no_second():
+    truth = {f"cogging.{name}": value for name, value in CASES["cogging"][0].items()}
+    fitter = CellFitter(Evidence(records(truth, runs=2), NOMINAL), NOMINAL, 0.1)
+    found = Stepwise(fitter, ["cogging", "torque_bias"]).run(fitter.refit())
+    assert found.best.effects == ("cogging",)
+    assert "cogging.second_ratio" not in found.best.model.effects
 
 
 @pytest.mark.parametrize("every", [2, 4])

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from gap_cases import SHORT, fitter_of, simulate_case
 
+from fjr_sim_node.effects import EFFECTS
+from gap_diagnosis.model.simulated_rig import Model, Simulator
 from gap_diagnosis.which.fits import Fit
 
 pytestmark = pytest.mark.slow
@@ -39,6 +41,54 @@ def test_a_third_mass_is_found_light_and_narrow_or_heavy(inertia, frequency, dam
     assert fit.converged and left < 1.5
     assert fit.model.effects["extra_mode.frequency_hz"] == pytest.approx(frequency, rel=0.01)
     assert fit.model.effects["extra_mode.inertia_kg_m2"] == pytest.approx(inertia, rel=0.05)
+
+
+@pytest.mark.parametrize("rest", [-0.4, 0.4])
+def test_a_spring_that_rests_far_from_the_motion_is_found(rest):
+    """It pulls nearly as a constant torque does, and still its stiffness shows."""
+    truth = {"external_spring.stiffness_nm_rad": 20.0, "external_spring.rest_rad": rest}
+    fit, left = fitted(truth, "external_spring")
+    assert fit.converged and left < 1.5
+    assert fit.model.effects["external_spring.rest_rad"] == pytest.approx(rest, rel=0.1)
+    assert fit.model.effects["external_spring.stiffness_nm_rad"] == pytest.approx(20.0, rel=0.1)
+
+
+def test_lugre_friction_begins_as_the_part_of_it_that_was_fitted():
+    case = simulate_case({}, seed=3, **SHORT)
+    simulator = Simulator(case.recorded)
+    begins = EFFECTS["lugre_friction"].from_part
+    for part in (
+        {"presliding_friction.motor_rad": 3e-4},
+        {
+            "stribeck_friction_motor.torque_nm": 3.0,
+            "stribeck_friction_motor.velocity_rad_s": 0.05,
+        },
+    ):
+        whole = begins(part, case.truth.plant)
+        models = [Model(case.truth.plant, effects) for effects in (part, whole)]
+        as_part, as_whole = simulator.many(models)
+        np.testing.assert_array_equal(as_whole, as_part)
+
+
+def test_lugre_friction_is_found_beside_another_effect_from_its_fitted_part():
+    """From its own starts the fit ends far off; from that of presliding friction it does not."""
+    truth = {
+        "lugre_friction.stribeck_nm": 6.0,
+        "lugre_friction.bristle_nm_rad": 3e3,
+        "lugre_friction.velocity_rad_s": 0.3,
+        "delay.time_s": 5e-4,
+    }
+    fitter = fitter_of(simulate_case(truth, seed=3, **SHORT))[2]
+    refit = fitter.refit()
+    delay = fitter.add(refit, "delay", fitter.screening(refit, "delay").proposals())
+    part = fitter.add(
+        delay, "presliding_friction", fitter.screening(delay, "presliding_friction").proposals()
+    )
+    whole = fitter.add(delay, "lugre_friction", fitter.from_part(delay, "lugre_friction", part))
+    whole = whole if whole.converged else fitter.continued(whole)
+    assert whole.train_chi2 < 0.5 * part.train_chi2
+    assert whole.held_chi2 / fitter.held.size < 1.5
+    assert whole.model.effects["lugre_friction.bristle_nm_rad"] == pytest.approx(3e3, rel=0.1)
 
 
 @pytest.mark.parametrize(("share", "knee"), [(0.45, 0.0), (0.7, 0.0), (0.85, 0.15)])
