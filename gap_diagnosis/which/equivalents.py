@@ -65,3 +65,20 @@ def stands_for(effects: Sequence[str], others: Sequence[str]) -> bool:
     """Tell whether explanations differ by one effect and a near equivalent of it."""
     mine, theirs = set(effects) - set(others), set(others) - set(effects)
     return len(mine) == 1 and bool(partners(sorted(theirs), mine))
+
+
+def plainness(
+    effects: Sequence[str], parameters: Sequence[str], laws: Sequence[Sequence[str]]
+) -> tuple[bool, int, int]:
+    """Return what puts the plainest of some explanations that do alike first.
+
+    One that holds another as a limit case stands last: its further parameters lie at their bounds,
+    where no test can call it present. Then the number of parameters counts, then how common it is.
+
+    Args:
+        effects: identifiers of the explanation.
+        parameters: its free effect parameters.
+        laws: effects of all explanations that do alike.
+    """
+    holds = any(fx.contains(effects, other) for other in laws)
+    return holds, len(parameters), fx.rare(effects)

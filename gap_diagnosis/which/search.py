@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 from fjr_sim_node import effects as fx
 
 from .attribution import NOTHING_LEFT, SECOND_GAIN, SMALL_GAIN, Attribution
-from .equivalents import SCALES, founded, holders, partners, stands_for
+from .equivalents import SCALES, founded, holders, partners, plainness, stands_for
 from .fits import Fit, Fitter
 from .harmonics import with_second_harmonics
 from .ranking import Ranking
@@ -68,9 +68,13 @@ class Search:
             scores.append(self._found.misfit(fit) * (1.0 if amplitudes is None else amplitudes))
         best = close[scores.index(min(scores))]
         tied = [best, *self._found.tied(best)]
+        laws = [fit.effects for fit in tied]
         return min(
             tied,
-            key=lambda fit: (len(fit.space.effects), fx.rare(fit.effects), self._found.misfit(fit)),
+            key=lambda fit: (
+                *plainness(fit.effects, fit.space.effects, laws),
+                self._found.misfit(fit),
+            ),
         )
 
     def run(self) -> Attribution:

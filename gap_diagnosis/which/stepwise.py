@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from fjr_sim_node import effects as fx
 
 from .cell_fits import CellFit, CellFitter
-from .equivalents import ONE_CAUSE, founded, holders, partners
+from .equivalents import ONE_CAUSE, founded, holders, partners, plainness
 from .gains import Gain, gain, stands_for
 from .screening import Proposal, Screening
 
@@ -213,8 +213,8 @@ class Stepwise:
     def _chosen(self, fits: Sequence[CellFit], parent: CellFit) -> CellFit | None:
         """Return the best fit whose gain repeats, unless another one gains much more.
 
-        Of those that unseen parts cannot tell from it, the one with the fewest parameters, and then
-        the commoner one.
+        Of those that unseen parts cannot tell from it, one that holds no other as a limit case, the
+        one with the fewest parameters, and then the commoner one.
         """
         gains = [gain(self._fitter, fit, parent, fit.acts) for fit in fits]
         repeating = [
@@ -227,7 +227,8 @@ class Stepwise:
         first = repeating[0]
         worth = self._gain(first, parent).mean
         alike = [f for f in repeating if f is first or stands_for(self._gain(first, f), worth)]
-        return min(alike, key=lambda fit: (len(fit.space.effects), fx.rare(fit.effects)))
+        laws = [fit.effects for fit in alike]
+        return min(alike, key=lambda fit: plainness(fit.effects, fit.space.effects, laws))
 
     def _tied(self, chosen: CellFit, fits: Sequence[CellFit], parent: CellFit) -> list[str]:
         """Return the effects that unseen parts cannot tell from the chosen one."""

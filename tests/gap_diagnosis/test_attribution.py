@@ -14,6 +14,7 @@ from gap_diagnosis.model.simulated_rig import Model, Simulator
 from gap_diagnosis.notes import unexplained
 from gap_diagnosis.which import ranking
 from gap_diagnosis.which.attribution import STANDS_OUT, Attribution, stands_out
+from gap_diagnosis.which.equivalents import plainness
 from gap_diagnosis.which.fits import Fit, Fitter
 from gap_diagnosis.which.least_squares import Solution
 from gap_diagnosis.which.search import Search
@@ -149,3 +150,12 @@ def test_a_rig_that_is_its_datasheet_without_noise_leaves_nothing_to_scale():
         exact, solution=replace(exact.solution, residuals=0.0 * exact.solution.residuals)
     )
     assert np.isfinite(fitter.screening(nothing, "torque_bias").gain)
+
+
+def test_of_explanations_that_do_alike_one_that_holds_another_stands_last():
+    """A law's further parameters lie at their bounds then, where no test can call it present."""
+    laws = [("delay", "torque_speed_limit"), ("delay", "torque_saturation")]
+    assert plainness(laws[0], "four", laws) > plainness(laws[1], "fours", laws)
+    assert plainness(laws[0], "four", laws[:1]) < plainness(laws[1], "fours", laws)
+    alike = [("gravity",), ("external_spring",)]
+    assert plainness(alike[0], "ab", alike) < plainness(alike[1], "ab", alike)

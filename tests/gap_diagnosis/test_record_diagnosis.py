@@ -28,6 +28,8 @@ LAW = pd_filtered.CONTROLLER.check({"sample_rate_hz": RATE_HZ})
 OFF = {"fsm": 6.3, "j": 0.31, "k0": 1550.0}
 SCHEMA = Path(__file__).parents[2] / "docs" / "schemas" / "diagnosis.schema.json"
 
+LIMITS = ("torque_saturation", "torque_speed_limit")
+
 
 def band_noise(seed: int, samples: int, rms_rad: float) -> np.ndarray:
     """Return noise from 0.3 to 15 Hz that begins and ends at zero."""
@@ -220,8 +222,9 @@ def test_a_cause_that_acts_at_the_highest_level_alone_is_judged_by_that_level(tm
     folder = write_records(
         tmp_path / "rig", {"torque_saturation.limit_nm": limit}, levels=(0, 0, 1, 1)
     )
-    found = diagnose(folder, read_nominal("paper"), effects=["torque_saturation", "load_friction"])
+    found = diagnose(folder, read_nominal("paper"), effects=[*LIMITS, "load_friction"])
     assert found.effects == ["torque_saturation"] and found.causes[0].present > 0.8
+    assert found.causes[0].others in ([], ["torque_speed_limit"])  # which holds a saturation
     size = found.causes[0].parameters["torque_saturation.limit_nm"]
     assert size.value == pytest.approx(limit, rel=0.02)
 
