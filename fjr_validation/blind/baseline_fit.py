@@ -30,7 +30,8 @@ from gap_diagnosis.outcome.diagnosis import (
 from gap_diagnosis.which.scales import Scales
 
 BUDGET_S = 120.0
-"""Time of one method for one case; what is begun then is ended (a simulation, not a fit)."""
+"""Processor time of one method for one case, which other work on the machine does not take away;
+what is begun then is ended (a simulation, not a fit)."""
 
 MATTERS = 0.1
 """The methods of others name nothing. What one has fitted is named if the error on the validation
@@ -46,7 +47,7 @@ class Problem:
     """Recorded runs to be met by a model.
 
     Attributes:
-        budget_s: time for all of it.
+        budget_s: processor time for all of it.
         nominal: nominal bare parameters; those of one body on a rigid axis.
         evidence: the runs, cut and divided.
         scales: what is usual in the record.
@@ -57,7 +58,7 @@ class Problem:
     def __init__(self, folder: Path, nominal: Mapping[str, float]) -> None:
         """Read the bags, whatever they hold; the budget begins."""
         self.budget_s = BUDGET_S
-        self._until = time.monotonic() + self.budget_s
+        self._until = time.process_time() + self.budget_s
         self.nominal = dict(Model.nominal(nominal).plant)
         self.fitted = tuple(name for name, value in self.nominal.items() if value)
         recorded = read_any(folder)
@@ -78,8 +79,8 @@ class Problem:
 
     @property
     def seconds_left(self) -> float:
-        """How much of the budget is left (s)."""
-        return max(self._until - time.monotonic(), 0.0)
+        """How much processor time of the budget is left (s)."""
+        return max(self._until - time.process_time(), 0.0)
 
     @property
     def sample_rate_hz(self) -> float:

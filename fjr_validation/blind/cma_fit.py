@@ -69,8 +69,8 @@ def cma_fit(
             "tolfun": _TOLERANCE,
         },
     )
-    until = time.monotonic() + seconds
-    while not strategy.stop() and time.monotonic() < until:
+    until = time.process_time() + seconds
+    while not strategy.stop() and time.process_time() < until:
         points = strategy.ask()
         costs = []
         for point in points:
