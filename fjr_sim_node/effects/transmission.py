@@ -146,7 +146,7 @@ TRANSMISSION: tuple[Effect, ...] = (
         (
             size("stiffness_nm_rad", "N m/rad", "Stiffness between link and frame", 0.0, 1e9),
             EffectParameter("rest_rad", 0.0, "rad", "Angle of the link at which it pulls nowhere",
-                            -1e4, 1e4, fit=(-30.0, 30.0)),
+                            -1e4, 1e4, fit=(-5.0, 5.0)),
         ),
         (
             {"stiffness_nm_rad": (0.01, 0.1), "rest_rad": (0.0,)},
