@@ -154,8 +154,9 @@ def test_a_rig_that_is_its_datasheet_without_noise_leaves_nothing_to_scale():
 
 def test_of_explanations_that_do_alike_one_that_holds_another_stands_last():
     """A law's further parameters lie at their bounds then, where no test can call it present."""
-    laws = [("delay", "torque_speed_limit"), ("delay", "torque_saturation")]
-    assert plainness(laws[0], "four", laws) > plainness(laws[1], "fours", laws)
-    assert plainness(laws[0], "four", laws[:1]) < plainness(laws[1], "fours", laws)
-    alike = [("gravity",), ("external_spring",)]
-    assert plainness(alike[0], "ab", alike) < plainness(alike[1], "ab", alike)
+    rich, plain = laws = [("delay", "torque_speed_limit"), ("delay", "torque_saturation")]
+    few, more = ("a", "b"), ("a", "b", "c")
+    assert plainness(rich, few, laws) > plainness(plain, more, laws)
+    assert plainness(rich, few, [rich]) < plainness(plain, more, [plain])
+    common, rare = laws = [("gravity",), ("external_spring",)]
+    assert plainness(common, few, laws) < plainness(rare, few, laws)

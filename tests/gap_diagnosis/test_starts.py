@@ -47,8 +47,8 @@ def test_a_third_mass_is_found_light_and_narrow_or_heavy(inertia, frequency, dam
 
 
 @pytest.mark.parametrize("rest", [-0.1, 0.1])
-def test_a_spring_that_rests_far_from_the_motion_is_found_in_records(rest):
-    """It pulls nearly as a constant torque does, and still its stiffness shows."""
+def test_a_spring_that_rests_beside_the_motion_is_found_in_records(rest):
+    """Three rms amplitudes away: it pulls much as a constant torque does; its stiffness still shows."""
     truth = {"external_spring.stiffness_nm_rad": 40.0, "external_spring.rest_rad": rest}
     fitter = CellFitter(Evidence(records(truth, runs=2), NOMINAL), NOMINAL, 0.1)
     refit = fitter.refit()
@@ -65,19 +65,21 @@ def test_lugre_friction_begins_as_the_part_of_it_that_was_fitted():
     begins = EFFECTS["lugre_friction"].from_part
     for part in (
         {"presliding_friction.motor_rad": 3e-4},
+        {"presliding_friction.motor_rad": 3e-4, "coulomb_friction.motor_nm": 2.0},
         {
             "stribeck_friction_motor.torque_nm": 3.0,
             "stribeck_friction_motor.velocity_rad_s": 0.05,
         },
     ):
-        whole = begins(part, case.truth.plant)
+        beside = {n: v for n, v in part.items() if n.startswith("coulomb_friction.")}
+        whole = beside | begins(part, case.truth.plant)
         models = [Model(case.truth.plant, effects) for effects in (part, whole)]
         as_part, as_whole = simulator.many(models)
         np.testing.assert_array_equal(as_whole, as_part)
 
 
 def test_lugre_friction_is_found_beside_another_effect_from_its_fitted_part():
-    """From its own starts the fit ends far off; from that of presliding friction it does not."""
+    """The start is presliding friction, which leaves more than twice as much; its end is the truth."""
     truth = {
         "lugre_friction.stribeck_nm": 6.0,
         "lugre_friction.bristle_nm_rad": 3e3,
