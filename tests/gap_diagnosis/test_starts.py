@@ -48,7 +48,7 @@ def test_a_third_mass_is_found_light_and_narrow_or_heavy(inertia, frequency, dam
 
 @pytest.mark.parametrize("rest", [-0.1, 0.1])
 def test_a_spring_that_rests_beside_the_motion_is_found_in_records(rest):
-    """Three rms amplitudes away: it pulls much as a constant torque does; its stiffness still shows."""
+    """Three rms amplitudes away: much like a constant torque, but its stiffness still shows."""
     truth = {"external_spring.stiffness_nm_rad": 40.0, "external_spring.rest_rad": rest}
     fitter = CellFitter(Evidence(records(truth, runs=2), NOMINAL), NOMINAL, 0.1)
     refit = fitter.refit()
@@ -79,7 +79,7 @@ def test_lugre_friction_begins_as_the_part_of_it_that_was_fitted():
 
 
 def test_lugre_friction_is_found_beside_another_effect_from_its_fitted_part():
-    """The start is presliding friction, which leaves more than twice as much; its end is the truth."""
+    """It starts as presliding friction, which leaves twice as much, and ends at the truth."""
     truth = {
         "lugre_friction.stribeck_nm": 6.0,
         "lugre_friction.bristle_nm_rad": 3e3,
