@@ -42,8 +42,8 @@ def _lugre_from_part(effects: Mapping[str, float], plant: Mapping[str, float]) -
     """Return the bristles of presliding friction, or level and velocity of Stribeck friction."""
     found = {}
     if bent := effects.get("presliding_friction.motor_rad"):
-        level = plant["fsm"] + effects.get("coulomb_friction.motor_nm", 0.0)
-        found["bristle_nm_rad"] = level / bent
+        coulomb = plant["fsm"] + effects.get("coulomb_friction.motor_nm", 0.0)
+        found["bristle_nm_rad"] = coulomb / bent
     if level := effects.get("stribeck_friction_motor.torque_nm"):
         velocity = effects["stribeck_friction_motor.velocity_rad_s"]
         found |= {"stribeck_nm": level, "velocity_rad_s": velocity}
