@@ -85,14 +85,20 @@ def limited(command, limit, knee):
 
 
 @jit
+def asked(command, e):
+    """Return what a drive without slew limit and gain error gives of a command (N m)."""
+    band = e[fx.DEAD_BAND_WIDTH_NM]
+    torque = command - min(max(command, -band), band)
+    return limited(torque, e[fx.TORQUE_SATURATION_LIMIT_NM], e[fx.TORQUE_SATURATION_KNEE])
+
+
+@jit
 def driven(x, command, sample_period, e):
     """Return the torque of the drive over a sample (N m): dead band, limit, slew limit, gain.
 
     A torque that slews is held at its mean over the sample.
     """
-    band = e[fx.DEAD_BAND_WIDTH_NM]
-    torque = command - min(max(command, -band), band)
-    torque = limited(torque, e[fx.TORQUE_SATURATION_LIMIT_NM], e[fx.TORQUE_SATURATION_KNEE])
+    torque = asked(command, e)
     if e[fx.TORQUE_SLEW_LIMIT_LIMIT_NM_S] != math.inf:
         most = e[fx.TORQUE_SLEW_LIMIT_LIMIT_NM_S] * sample_period
         change = torque - x[_SLEWED]
@@ -109,7 +115,7 @@ def driven(x, command, sample_period, e):
 def hold(x, command, sample_period, p, e):
     """Advance the rig in place by one sample period under a held torque command.
 
-    A torque that slews is no held torque: it is followed in parts.
+    A torque that slews is no held torque: it is followed in parts for as long as it slews.
 
     Args:
         x: state from `at_rest`.
@@ -121,10 +127,20 @@ def hold(x, command, sample_period, p, e):
     if e is None:
         x[0], x[1], x[2], x[3] = advance(x[0], x[1], x[2], x[3], command, sample_period, p)
         return
-    most = e[fx.TORQUE_SLEW_LIMIT_LIMIT_NM_S] * sample_period
-    parts = 1 if abs(command - x[_SLEWED]) <= _AT_ONCE * most else _SLEW_PARTS
+    slewing = 0.0
+    if e[fx.TORQUE_SLEW_LIMIT_LIMIT_NM_S] != math.inf:
+        most = e[fx.TORQUE_SLEW_LIMIT_LIMIT_NM_S] * sample_period
+        slewing = min(abs(asked(command, e) - x[_SLEWED]) / most, 1.0)
+        if e[fx.DELAY_TIME_S] != 0.0:  # what is remembered must lie evenly in time
+            slewing = 1.0
+    if not slewing > _AT_ONCE:
+        _hold_with_effects(x, command, sample_period, p, e)
+        return
+    parts = math.ceil(_SLEW_PARTS * slewing)
     for _ in range(parts):
-        _hold_with_effects(x, command, sample_period / parts, p, e)
+        _hold_with_effects(x, command, slewing * sample_period / parts, p, e)
+    if slewing < 1.0:
+        _hold_with_effects(x, command, (1.0 - slewing) * sample_period, p, e)
 
 
 @jit

@@ -30,7 +30,8 @@ class _Motion:
     """One period of a model's motion, (realizations, N) each, and the loop's response to torque.
 
     Attributes:
-        motor, velocity, torque, transmitted: rad, rad/s, N m, N m.
+        motor: rad.
+        velocity, torque, transmitted: rad/s, N m, N m, in single precision.
         response: complex (realizations, lines), position per torque on the motor, rad/(N m).
         both: the same of a torque between link and motor.
     """
@@ -135,12 +136,21 @@ def _motion(
     p, twist = model.plant, q - y
     return _Motion(
         motor=y,
-        velocity=np.gradient(y, axis=1) * description.sample_rate_hz,
-        torque=u,
-        transmitted=p.get("k0", 0.0) * twist,
+        velocity=(np.gradient(y, axis=1) * description.sample_rate_hz).astype(np.float32),
+        torque=u.astype(np.float32),
+        transmitted=(p.get("k0", 0.0) * twist).astype(np.float32),
         response=response,
         both=response * of_pair(p, lines * description.base_frequency_hz),
     )
+
+
+def waves(cycles: float, angle: np.ndarray) -> np.ndarray:
+    """Return sine and cosine of some cycles a turn along an angle (rad), float32 (2, ...).
+
+    They are off by 6e-8 times the phase: by half a percent at a thousand turns of a ripple.
+    """
+    turned = (cycles * angle).astype(np.float32)
+    return np.array([np.sin(turned), np.cos(turned)])
 
 
 def of_pair(p: Mapping[str, float], frequency_hz: np.ndarray) -> np.ndarray:
@@ -167,8 +177,7 @@ def _of_ripple(
     effect: str, cycles: float, motion: _Motion, plant: Mapping[str, float]
 ) -> np.ndarray:
     """Return the changes by the sine and the cosine of a ripple of size 1."""
-    angle = cycles * motion.motor
-    turns = np.array([np.sin(angle), np.cos(angle)])
+    turns = waves(cycles, motion.motor)
     lines = motion.response.shape[-1]
     acts_on = fx.EFFECTS[effect].acts_on
     if acts_on == "motor":
@@ -178,7 +187,7 @@ def _of_ripple(
             turns = turns * motion.torque
         changes = line_spectrum(turns, lines) * motion.response
     else:
-        slopes = cycles * np.array([np.cos(angle), -np.sin(angle)])
-        changes = line_spectrum(plant["k0"] * turns, lines) * motion.both
+        slopes = np.float32(cycles) * np.array([turns[1], -turns[0]])
+        changes = line_spectrum(turns, lines) * plant["k0"] * motion.both
         changes -= line_spectrum(slopes * motion.transmitted, lines) * motion.response
     return changes

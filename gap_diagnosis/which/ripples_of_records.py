@@ -19,7 +19,7 @@ from fjr_sim_node.theory.linear import g0
 from ..model.evidence import Evidence
 from ..model.simulated_rig import Model
 from .least_squares import Solution
-from .ripples import of_pair
+from .ripples import of_pair, waves
 
 MOST_TRIED = 240
 _FREE_HZ = 1e-3  # below, a free body has no response
@@ -48,10 +48,14 @@ class RecordRipples:
         """
         self._evidence, self._parts, self._weight = evidence, tuple(parts), weight
         self._runs = sorted({evidence.parts[i].record for i in parts})
-        self._motion = evidence.simulator.run([model], self._runs)[0]
+        motion = evidence.simulator.run([model], self._runs)[0]
+        self._motor = [run[0] for run in motion]
+        self._torque = [run[1].astype(np.float32) for run in motion]
+        self._twist = [(run[2] - run[0]).astype(np.float32) for run in motion]
+        self._direction = [np.sign(np.gradient(run[0])).astype(np.float32) for run in motion]
         self._every = _averaged(evidence.hop, evidence.lines)
-        self._responses = [self._response(model, index, run.shape[1] // self._every) for index, run
-                           in zip(self._runs, self._motion, strict=True)]  # fmt: skip
+        self._responses = [self._response(model, index, run.size // self._every) for index, run
+                           in zip(self._runs, self._motor, strict=True)]  # fmt: skip
         self._basis = np.linalg.qr(parent.jacobian)[0]
         self._left = self._beyond(parent.residuals)
         self._stiffness = model.plant.get("k0", 0.0)
@@ -90,23 +94,22 @@ class RecordRipples:
             (2, N) on the motor; (4, N) where the link feels torques too: the last two act between
             link and motor.
         """
-        motor, torque, link = self._motion[k][:3]
-        waves = np.array([np.sin(cycles * motor), np.cos(cycles * motor)])
+        turns = waves(cycles, self._motor[k])
         acts_on = fx.EFFECTS[effect].acts_on
         if acts_on == "motor":
-            return -waves * np.sign(np.gradient(motor))
+            return -turns * self._direction[k]
         if acts_on == "transmission":
-            slopes = cycles * np.array([waves[1], -waves[0]])
-            return self._stiffness * np.concatenate([-slopes * (link - motor), waves])
+            slopes = np.float32(cycles) * np.array([turns[1], -turns[0]])
+            return np.float32(self._stiffness) * np.concatenate([-slopes * self._twist[k], turns])
         if not fx.EFFECTS[effect].full_parameters[0].unit:  # a share of the torque, not a torque
-            return waves * torque
-        return waves
+            return turns * self._torque[k]
+        return turns
 
     def _moved(self, k: int, torques: np.ndarray) -> np.ndarray:
         """Return the changes of the position by `_torques`, averaged, (2, N // every)."""
         count, samples = len(torques), torques.shape[1] // self._every
         blocks = torques[:, : samples * self._every].reshape(count, samples, self._every)
-        averaged = blocks @ np.full(self._every, 1.0 / self._every)
+        averaged = blocks @ np.full(self._every, 1.0 / self._every, np.float32)
         response, size = self._responses[k], 2 * (self._responses[k].shape[1] - 1)
         spectra = rfft(averaged, size).reshape(-1, 2, response.shape[1])
         moved = np.einsum("fnl,fl->nl", spectra, response[: len(spectra)])
@@ -125,7 +128,8 @@ class RecordRipples:
         plant_response = g0(plant, frequency, rate)
         holds = np.nan_to_num(self._evidence.simulator.response(frequency, index))
         response = plant_response / (1.0 + plant_response * holds)
-        return response * np.array([np.ones(frequency.size), of_pair(model.plant, frequency)])
+        pair = np.array([np.ones(frequency.size), of_pair(model.plant, frequency)])
+        return (response * pair).astype(np.complex64)
 
     def _beyond(self, errors: np.ndarray) -> np.ndarray:
         """Return what the parent's parameters can't follow of errors, (errors,)."""

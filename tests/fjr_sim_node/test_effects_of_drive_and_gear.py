@@ -131,6 +131,16 @@ def test_a_torque_that_slews_is_the_ramp(rate):
     assert np.allclose(states[:, 3], speed, atol=2e-3 * np.abs(speed).max())
 
 
+def test_a_torque_that_slews_now_and_then_is_late_by_the_delay():
+    """A free motor under it is at each sample where it was three samples before without delay."""
+    commands = np.repeat([30.0, -10.0, 5.0, 5.0], 10)
+    slews = named("torque_slew_limit", limit_nm_s=7e4)  # some samples slew, most do not
+    at_once = Rig(FREE_MOTOR, slews).play(commands)
+    late = Rig(FREE_MOTOR, {**slews, **named("delay", time_s=3e-3)}).play(commands)
+    assert np.allclose(late[3:], at_once[:-3], atol=1e-5 * np.abs(at_once).max())
+    assert not late[:3].any()
+
+
 def test_a_dead_band_shortens_every_command():
     shortened = np.sign(TORQUE) * np.maximum(np.abs(TORQUE) - 7.0, 0.0)
     exact = Rig({}, named("load_friction", coefficient=1e-300)).play(shortened)
