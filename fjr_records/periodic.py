@@ -124,6 +124,7 @@ class RecordedExperiment:
                 r.torque.ravel(),
                 r.position.ravel(),
                 None if r.link is None else r.link.ravel(),
+                r.experiment.elapsed_s,
             )
             for r in self.realizations
         )

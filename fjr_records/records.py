@@ -35,6 +35,7 @@ class Record:
         torque: u, likewise in N m.
         position: y, likewise in rad.
         link: q, likewise in rad; None without a second encoder.
+        elapsed_s: when it began, since the first run did (s); zero where that is not known.
     """
 
     name: str
@@ -43,6 +44,7 @@ class Record:
     torque: np.ndarray
     position: np.ndarray
     link: np.ndarray | None
+    elapsed_s: float = 0.0
 
     @property
     def level(self) -> int:

@@ -16,7 +16,9 @@ from fjr_records.experiment_folder import Override
 from fjr_records.periodic import RecordedExperiment, read_experiment
 from fjr_records.records import RecordSet, read_records, reference_optional
 
+from .gates.drift_gate import drift_gate
 from .investigation import Investigation, investigate
+from .judgement import stopped
 from .notes import NOT_HELD_OUT
 from .outcome.diagnosis import Diagnosis
 from .record_investigation import RecordInvestigation, investigate_records
@@ -149,12 +151,24 @@ def investigate_any(
             progress=progress,
         )  # fmt: skip
         if unsteady and not whole.diagnosis.causes:
-            return steady
+            progress("drift within runs")
+            return _drifting(steady, whole)
         return _beside(whole, steady, UNSTEADY if unsteady else UNTESTED if untested else BESIDE)
     return investigate_records(
         recorded, nominal, tolerance=tolerance, effects=effects, budget_s=budget_s,
         progress=progress,
     )  # fmt: skip
+
+
+def _drifting(steady: Investigation, whole: RecordInvestigation) -> Investigation:
+    """Return what gates said of unsteady periods, with whether friction drifts within runs."""
+    gate = drift_gate(whole.fitter, whole.found.steps[0])
+    gates = replace(steady.gates, gates=(*steady.gates.gates, gate))
+    if gate.passed:
+        return replace(steady, gates=gates)
+    steadier = [g for g in gates.gates if g.passed or g.hint != "bad_data" or not g.of_periods]
+    told = stopped("nonstationary", replace(gates, gates=tuple(steadier)))
+    return replace(steady, gates=gates, diagnosis=told)
 
 
 def _beside(whole: RecordInvestigation, steady: Investigation, why: str) -> RecordInvestigation:

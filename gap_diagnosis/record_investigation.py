@@ -51,18 +51,23 @@ class RecordInvestigation:
     """Everything that a diagnosis of records rests on.
 
     Attributes:
-        evidence: the records in windows, and what plays them.
+        fitter: fits explanations to the records.
         nominal: the nominal model.
         found: the steps of the search.
         tested: the causes with their tests.
         diagnosis: the outcome.
     """
 
-    evidence: Evidence
+    fitter: CellFitter
     nominal: Model
     found: Found
     tested: tuple[Tested, ...]
     diagnosis: Diagnosis
+
+    @property
+    def evidence(self) -> Evidence:
+        """The records in windows, and what plays them."""
+        return self.fitter.evidence
 
     @property
     def recorded(self) -> RecordSet:
@@ -110,7 +115,7 @@ def investigate_records(
     progress("judgement")
     notes = [*records.notes, *cut, *heard, *_notes(evidence, found)]
     diagnosis = judge_records(fitter, model, found, tested, alternatives, bags, scatter, notes)
-    return RecordInvestigation(evidence, model, found, tuple(tested), diagnosis)
+    return RecordInvestigation(fitter, model, found, tuple(tested), diagnosis)
 
 
 def _refitted(

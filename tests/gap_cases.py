@@ -65,6 +65,7 @@ def simulate_case(
     with_link: bool = False,
     base_frequency_hz: float = 0.25,
     order: str = "levels",
+    grid: str = "odd_random",
     controller: Mapping[str, Any] | None = None,
     plant: Mapping[str, float] | None = None,
 ) -> Case:
@@ -84,6 +85,7 @@ def simulate_case(
             "base_frequency_hz": base_frequency_hz,
             "f_min_hz": base_frequency_hz,
             "order": order,
+            "grid": grid,
             "amplitudes_rad": tuple(levels_rad),
             "realizations": realizations,
             "periods": periods,

@@ -37,6 +37,7 @@ class Drive:
         added_torque: recorded torque beside the observer's, (samples,) in N m; None in the loop.
         start: position (rad) and velocity (rad/s) at the first sample.
         entry: state of the law before it; None for zero.
+        elapsed_s: time since the first run began, for what drifts.
     """
 
     reference: np.ndarray
@@ -44,6 +45,7 @@ class Drive:
     added_torque: np.ndarray | None
     start: tuple[float, float]
     entry: np.ndarray | None = None
+    elapsed_s: float = 0.0
 
     @property
     def observed(self) -> bool:
@@ -64,7 +66,7 @@ class Drive:
             InputError: the motion diverged.
         """
         return simulate_law(
-            self.reference, sample_rate_hz, p, self.law, None, e,
+            self.reference, sample_rate_hz, p, self.law, None, e, self.elapsed_s,
             added_torque=self.added_torque, start=self.start, controller_state=self.entry,
         )  # fmt: skip
 
@@ -151,11 +153,15 @@ class RecordSimulator:
         if law is None:
             return self._observed(index)
         assert record.reference is not None
-        return Drive(record.reference, law, None, self._starts[index], self._entries[index])
+        start, entry = self._starts[index], self._entries[index]
+        return Drive(record.reference, law, None, start, entry, record.elapsed_s)
 
     def _observed(self, index: int) -> Drive:
         record = self.records.records[index]
-        return Drive(record.position, self._observer, record.torque, self._starts[index])
+        start = self._starts[index]
+        return Drive(
+            record.position, self._observer, record.torque, start, elapsed_s=record.elapsed_s
+        )
 
     def _one(self, job: tuple[Model, int]) -> np.ndarray:
         model, index = job

@@ -115,9 +115,10 @@ class CellFitter:
                 along.seeds(effect, tried),
             )
         seeds = [*starts(effect, self.scales, cycles, self.nominal), *seen]
-        return self._started(parent, seeds)
+        return self.screening_of(parent, seeds)
 
-    def _started(self, parent: CellFit, seeds: Sequence[Mapping[str, float]]) -> Screening:
+    def screening_of(self, parent: CellFit, seeds: Sequence[Mapping[str, float]]) -> Screening:
+        """Return what starts promise beside a fit."""
         return Screening(
             parent.solution,
             parent.model,
@@ -190,7 +191,7 @@ class CellFitter:
         """
         ratio, phase = f"{ripple}.second_ratio", f"{ripple}.second_phase_rad"
         seeds = [{ratio: 0.2, phase: angle} for angle in (0.0, 0.5 * math.pi)]
-        found = self.add(fit, ripple, self._started(fit, seeds).proposals(), 1)
+        found = self.add(fit, ripple, self.screening_of(fit, seeds).proposals(), 1)
         return None if found is None else replace(found, effects=fit.effects)
 
     def begun(self, parent: CellFit) -> float:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,9 +24,11 @@ LAG_S = 1e-3
 KNOWN = ("actuator_lag", "torque_bias", "encoder_eccentricity")
 
 
-def warming_anew(effects: dict[str, float]) -> RecordedExperiment:
+def warming_anew(
+    effects: dict[str, float], drift: Mapping[str, float] = WARMING, **settings: Any
+) -> RecordedExperiment:
     """Return an experiment each run of which starts cold: friction falls within it, not beyond."""
-    case = simulate_case(effects, seed=4, realizations=3, **SHORT)
+    case = simulate_case(effects, seed=4, realizations=3, **{**SHORT, **settings})
     rng = np.random.default_rng(8)
     law = pd_filtered.CONTROLLER.check({})
     made = []
@@ -35,7 +39,7 @@ def warming_anew(effects: dict[str, float]) -> RecordedExperiment:
             coefficients(case.truth.plant),
             pd_filtered.coefficients(law),
             NOISE_RAD * rng.standard_normal(r.position.size),
-            fx.coefficients({**effects, **WARMING}),
+            fx.coefficients({**effects, **drift}),
             0.0,
         )
         shape = r.position.shape
@@ -73,3 +77,33 @@ def test_a_record_that_is_damaged_is_not_searched():
     )
     found = investigate_any(bad, PLANT.defaults(), effects=KNOWN)
     assert not found.gates.only_unsteady and found.diagnosis.verdict == "bad_data"
+
+
+NO_FREE_LINES = {"grid": "full", "transient_periods": 1}
+
+
+@pytest.mark.parametrize("anew", [True, False])
+def test_a_drift_is_told_from_a_transient_where_no_line_is_free_of_excitation(anew):
+    """Two kept periods that differ may be either; played from their start, runs tell which."""
+    warming = {"nonstationary.friction_per_s": -0.01}
+    recorded = (
+        warming_anew({}, warming, **NO_FREE_LINES)
+        if anew
+        else simulate_case(warming, seed=4, realizations=3, **{**SHORT, **NO_FREE_LINES}).recorded
+    )
+    steady = investigate(recorded, PLANT.defaults(), effects=KNOWN)
+    assert steady.diagnosis.verdict == "bad_data" and steady.gates.only_unsteady
+    found = investigate_any(recorded, PLANT.defaults(), effects=KNOWN)
+    assert found.diagnosis.verdict == "nonstationary" and not found.diagnosis.causes
+    assert "friction drifts within runs, by -" in found.diagnosis.notes[0]
+    assert not any("transient" in note for note in found.diagnosis.notes)
+
+
+def test_a_transient_is_no_drift():
+    recorded = simulate_case(
+        seed=4, realizations=3, **{**SHORT, **NO_FREE_LINES, "transient_periods": 0}
+    ).recorded
+    found = investigate_any(recorded, PLANT.defaults(), effects=KNOWN)
+    assert found.diagnosis.verdict == "bad_data"
+    assert any("still transient" in note for note in found.diagnosis.notes)
+    assert found.gates.gates[-1].name == "stationary within runs" and found.gates.gates[-1].passed
