@@ -16,7 +16,7 @@ from fjr_bringup.replay.comparison import ReplayResult
 from fjr_compare.result import Comparison
 from fjr_export.result import Export
 from fjr_interface.experiment import Experiment
-from fjr_validation.blind.check import Manifest, Unsealed
+from fjr_validation.blind.check_documents import Manifest, Unsealed
 from fjr_validation.blind.score import Scores
 from fjr_validation.paper.reproduction import PaperResults
 from gap_diagnosis.foresight.foreseen import Foresight

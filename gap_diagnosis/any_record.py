@@ -16,7 +16,7 @@ from fjr_records.experiment_folder import Override
 from fjr_records.periodic import RecordedExperiment, read_experiment
 from fjr_records.records import RecordSet, read_records, reference_optional
 
-from .gates.drift_gate import drift_gate
+from .drift_gate import drift_gate
 from .investigation import Investigation, investigate
 from .judgement import stopped
 from .notes import NOT_HELD_OUT

@@ -24,7 +24,7 @@ from .outcome.diagnosis import (
     Verdict,
 )
 from .which.cell_fits import CellFit, CellFitter
-from .which.gains import Gain, gain
+from .which.gains import Gain, closed, fall, gain
 from .which.presence import (
     LEAST_INVARIANCE_P,
     at_its_bound,
@@ -142,10 +142,10 @@ def tested_causes(
                 gain(fitter, fit, without, fitter.acted(fit, effect)),
                 without,
                 invariance(fitter, fit, effect, scatter),
-                beyond_zero(effect, estimates, fitter.fall(fit, without)),
+                beyond_zero(effect, estimates, fall(fitter, fit, without)),
                 at_its_bound(fit, effect),
                 ledger.share(without.model, fit.model, refit.model),
-                fitter.closed(fit, without),
+                closed(fitter, fit, without),
             )
         )
     return found

@@ -6,7 +6,6 @@ else is raised, however damaged the bag. See `mcap_blocks` for what checksums ca
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,6 +20,7 @@ from ..topics import EXPERIMENT_TOPIC, STRING
 from .audit import Grid, SignalAudit, refuse_different_stamps, regular_rate_hz
 from .blocks import MEND, Block
 from .files import bag_files, find_bags
+from .signal_queues import SignalQueue, ready_and_lag
 from .signals import DEFAULT, SignalMap, SignalSource, decode
 
 __all__ = [
@@ -116,14 +116,15 @@ class BagReader:
         described = None if self.experiment is None else self.experiment.samples
         grid = Grid(self.sample_rate_hz, described)
         queues = {
-            name: _Queue(SignalAudit(self._bag, topic, grid)) for name, topic in self.topics.items()
+            name: SignalQueue(SignalAudit(self._bag, topic, grid))
+            for name, topic in self.topics.items()
         }
         first = 1
         for block in self._messages():
             for name, queue in queues.items():
                 if self.topics[name] == block.topic.name:
                     queue.add(*decode(block, self._sources[name], self._bag))
-            ready, lag = _ready_and_lag(queues)
+            ready, lag = ready_and_lag(queues)
             while ready >= samples:
                 yield self._record(queues, samples, first)
                 first, ready = first + samples, ready - samples
@@ -131,13 +132,13 @@ class BagReader:
                 self._refuse_lag(queues, first + ready)
         for queue in queues.values():
             queue.audit.finish()
-        ready, lag = _ready_and_lag(queues)
+        ready, lag = ready_and_lag(queues)
         rest = [self._record(queues, ready, first)] if ready else []  # refuses different stamps
         if lag > (self._greatest_lag() if self._files.unclosed else 0):
             self._refuse_lag(queues, first + ready)
         yield from rest
 
-    def _record(self, queues: dict[str, _Queue], samples: int, first: int) -> Record:
+    def _record(self, queues: dict[str, SignalQueue], samples: int, first: int) -> Record:
         taken = {name: queue.take(samples) for name, queue in queues.items()}
         stamps = taken["position"][0]
         for name, (others, _) in taken.items():
@@ -243,44 +244,12 @@ class BagReader:
             ends = " and ".join(f"{count} messages of {topic}" for topic, count in counts.items())
             self.notes += (f"{self.path.name}: there are {ends}; the last ones are left out.",)
 
-    def _refuse_lag(self, queues: dict[str, _Queue], number: int) -> None:
+    def _refuse_lag(self, queues: dict[str, SignalQueue], number: int) -> None:
         behind = min(queues, key=lambda name: queues[name].audit.samples)
         raise InputError(
             f"{self._bag}: {self.topics[behind]}: sample {number} and later ones are missing where "
             f"other topics have them; {MEND}."
         )
-
-
-class _Queue:
-    """Samples of one signal that wait for those of the others."""
-
-    def __init__(self, audit: SignalAudit) -> None:
-        self.audit = audit
-        self.waiting = 0
-        self._parts: deque[tuple[np.ndarray, np.ndarray]] = deque()
-
-    def add(self, stamps: np.ndarray, values: np.ndarray) -> None:
-        self.audit.check(stamps, values)
-        self._parts.append((stamps, values))
-        self.waiting += len(stamps)
-
-    def take(self, samples: int) -> tuple[np.ndarray, np.ndarray]:
-        taken = []
-        self.waiting -= samples
-        while samples:
-            stamps, values = self._parts.popleft()
-            if len(stamps) > samples:
-                self._parts.appendleft((stamps[samples:], values[samples:]))
-                stamps, values = stamps[:samples], values[:samples]
-            taken.append((stamps, values))
-            samples -= len(stamps)
-        stamps, values = zip(*taken, strict=True)
-        return np.concatenate(stamps), np.concatenate(values)
-
-
-def _ready_and_lag(queues: dict[str, _Queue]) -> tuple[int, int]:
-    waiting = [queue.waiting for queue in queues.values()]
-    return min(waiting), max(waiting) - min(waiting)
 
 
 def _string(payload: bytes, source: str) -> bytes:

@@ -28,16 +28,14 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Literal
-
-from pydantic import Field
+from typing import Any
 
 from fjr_kit.atomic import write_whole
 from fjr_kit.errors import InputError
 from fjr_kit.installed import product_version
-from fjr_kit.result_types import Document
 
 from .answers import WORLDS, Answer, World
+from .check_documents import Manifest, Unsealed
 from .frozen import frozen_digest
 from .json_lines import JsonLines
 from .lanes import Job, finished_jobs
@@ -47,27 +45,6 @@ from .seal import Secret, digest, opened_line
 
 Report = Callable[[int, int, str], None]
 """Called with (done, all, what was done)."""
-
-
-class Manifest(Document):
-    """What `blind.json` holds: what a check is; see `BlindCheck`."""
-
-    schema_name: Literal["fjr_rig/blind/2"] = Field("fjr_rig/blind/2", alias="schema")
-    check: str
-    cases: dict[str, int]
-    methods: tuple[str, ...]
-    frozen: str
-    version: str
-
-
-class Unsealed(Document):
-    """What `unsealed.json` holds."""
-
-    schema_name: Literal["fjr_rig/unsealed/1"] = Field("fjr_rig/unsealed/1", alias="schema")
-    seed: int
-    key: str
-    verdicts_sha256: str
-    finished: bool
 
 
 @dataclass(frozen=True)

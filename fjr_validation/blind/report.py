@@ -12,7 +12,8 @@ from fjr_kit.atomic import write_whole
 from fjr_kit.errors import InputError
 
 from .answers import Answer
-from .check import BlindCheck, Unsealed
+from .check import BlindCheck
+from .check_documents import Unsealed
 from .figures import draw_all
 from .frozen import frozen_digest
 from .outcome import Outcome

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from .answers import WORLDS, World
-from .check import Manifest
+from .check_documents import Manifest
 from .outcome import CLEAR, CONFIDENT, Outcome
 from .score import TARGETS, Score, Scores, met, rate
 

@@ -3,17 +3,13 @@
 closed    multisines; nothing but effects of the catalogue is there: none, one or two
 open      multisines; every rig has a remainder, and beside it one cause, two, or none
 records   a remainder as well, under chirps, noise, trapezoidal moves or steps, from rest
-
-`python -m fjr_validation.blind.worlds --world open --seed 201 --numbers 0-4 --out FOLDER` makes
-some with their answers beside the bags, for development.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -285,27 +281,3 @@ class _Case:
 def _parameter_file(nominal: Mapping[str, float]) -> str:
     lines = [f"    {name}: {'.inf' if math.isinf(v) else repr(v)}" for name, v in nominal.items()]
     return "\n".join(["/rig/simulator:", "  ros__parameters:", *lines]) + "\n"
-
-
-def _numbers(text: str) -> Iterator[int]:
-    first, _, last = text.partition("-")
-    yield from range(int(first), int(last or first) + 1)
-
-
-def main() -> None:
-    """Make cases with open answers."""
-    parser = argparse.ArgumentParser(description="Make cases of a world with open answers.")
-    parser.add_argument("--world", choices=WORLDS, required=True)
-    parser.add_argument("--seed", type=int, required=True)
-    parser.add_argument("--numbers", default="0-4", help="such as 3 or 0-9")
-    parser.add_argument("--out", type=Path, required=True)
-    given = parser.parse_args()
-    for number in _numbers(given.numbers):
-        folder = given.out / f"{given.world}_{given.seed}_{number:04d}"
-        answer = make_case(given.seed, number, given.world, folder)
-        names = " + ".join(cause.name for cause in answer.causes) or "no cause"
-        print(f"{folder}: {answer.kind}, {answer.excitation}: {names}", flush=True)
-
-
-if __name__ == "__main__":
-    main()

@@ -182,18 +182,6 @@ class CellFitter:
                 best = fit
         return None if best is None else replace(best, acts=self.acted(best, effect))
 
-    def second_harmonic(self, fit: CellFit, ripple: str) -> CellFit | None:
-        """Return a fit with a second harmonic of one of its ripples; None if none promises any.
-
-        Args:
-            fit: an explanation.
-            ripple: identifier of an angle-periodic effect of it, of one harmonic so far.
-        """
-        ratio, phase = f"{ripple}.second_ratio", f"{ripple}.second_phase_rad"
-        seeds = [{ratio: 0.2, phase: angle} for angle in (0.0, 0.5 * math.pi)]
-        found = self.add(fit, ripple, self.screening_of(fit, seeds).proposals(), 1)
-        return None if found is None else replace(found, effects=fit.effects)
-
     def begun(self, parent: CellFit) -> float:
         """Return what a fit costs itself, as its proposals do."""
         return float(self.weights.costs(parent.variance, parent.solution.residuals[None])[0])
@@ -237,16 +225,6 @@ class CellFitter:
         errors = self.evidence.errors([space.model(start)], self.fit_parts)[0]
         return self._reweighted(rest, space, start, self.weights.variance(errors), _REFIT_ROUNDS)
 
-    def fall(self, fit: CellFit, without: CellFit) -> float:
-        """Return by how much twice the negative log-likelihood of the fitted parts falls.
-
-        Args:
-            fit: with an effect.
-            without: the fit that lacks it.
-        """
-        ratio = np.log(without.variance / fit.variance)
-        return max(float(self.weights.numbers(fit.variance) @ ratio), 0.0)
-
     def misfit(self, fit: CellFit) -> float:
         """Return what a fit leaves on unseen parts over noise and the simulation's own error.
 
@@ -268,21 +246,6 @@ class CellFitter:
             (parts,), nats.
         """
         return self.weights.gained(after.left, before.left).sum(axis=1)
-
-    def left_of(self, after: CellFit, before: CellFit) -> float:
-        """Return how much of the squared error on unseen parts one fit leaves of another's."""
-        left = [float(np.sum(self.weights.counts * fit.left)) for fit in (after, before)]
-        return left[0] / left[1]
-
-    def closed(self, after: CellFit, before: CellFit) -> float:
-        """Return how much of what one fit leaves on unseen parts another closes, in one band.
-
-        The band is the one in which it gains most log-likelihood: a delay shows at high
-        frequencies, where little of the motion is.
-        """
-        left = [np.sum(self.weights.counts * fit.left, axis=0) for fit in (before, after)]
-        most = int(np.argmax(self.weights.gained(after.left, before.left).sum(axis=0)))
-        return float(1.0 - left[1][most] / left[0][most])
 
     def _left(self, model: Model, variance: np.ndarray) -> np.ndarray:
         others = deviated(model) if self.weights.unseen else []

@@ -17,13 +17,12 @@ from .catalogue import catalogue
 from .from_parts import from_part
 from .least_squares import Solution, solve
 from .ripples import RippleSearch
-from .screening import Costs, Proposal, Screening, sums_of_squares
+from .screening import Costs, Proposal, Screening, different, sums_of_squares
 from .search_space import TOLERANCE, Scales, Space, space_for, starts
 
 _KEPT_STARTS = 2
 _MOST_STEPS = 40
 MORE_STEPS = 160  # along a valley in which sizes and parameters nearly replace each other
-_NESTED_STEPS = 3
 _FIRST_STEPS = 6
 RIPPLES_TRIED = 4
 _LITTLE = 0.95  # of the parent's chi-square: another start of what leaves more is not pursued,
@@ -69,6 +68,8 @@ class Fitter:
         recorded: the experiment.
         nominal: datasheet values of the base parameters.
         tolerance: how far a datasheet value may be off, relative.
+        levels: level of each realization.
+        misfit_of: takes indices of realizations, returns their misfit.
         train, held: misfit of the realizations to fit, and of those to judge by.
         scales: what is usual in the record, the measures of starts and bounds.
         catalogue: effects to look for.
@@ -99,19 +100,19 @@ class Fitter:
         """
         self.catalogue = catalogue(nominal, effects)
         self.recorded, self._simulator = recorded, simulator
-        self._levels = [realization.level for realization in recorded.realizations]
-        self._misfit = lambda which: Misfit(recorded, simulator, noise_std, which)
+        self.levels = [realization.level for realization in recorded.realizations]
+        self.misfit_of = lambda which: Misfit(recorded, simulator, noise_std, which)
         self.nominal = dict(nominal)
         self.tolerance = tolerance
         self.train = Misfit(recorded, simulator, noise_std, train)
         self.held = Misfit(recorded, simulator, noise_std, held)
-        self._few = [next(i for i in train if self._levels[i] == k) for k in self._train_levels]
-        self._screened = self._misfit(self._few)
+        self._few = [next(i for i in train if self.levels[i] == k) for k in self._train_levels]
+        self._screened = self.misfit_of(self._few)
         self.scales = Scales.of_experiment(recorded, self.nominal)
 
     @property
     def _train_levels(self) -> list[int]:
-        return sorted({self._levels[i] for i in self.train.which})
+        return sorted({self.levels[i] for i in self.train.which})
 
     def refit(self) -> Fit:
         """Fit the base parameters alone, level after level added from the lowest amplitude up.
@@ -122,42 +123,18 @@ class Fitter:
         space = Space(self.nominal, (), (), self.tolerance, self.scales)
         x = np.zeros(len(self.nominal))
         for highest in self._train_levels[:-1]:
-            misfit = self._misfit([i for i in self.train.which if self._levels[i] <= highest])
-            x = self._reached(space, x, misfit, _FIRST_STEPS).x
+            misfit = self.misfit_of([i for i in self.train.which if self.levels[i] <= highest])
+            x = self.reached(space, x, misfit, _FIRST_STEPS).x
         return self.solve((), space, x)
 
-    def across_levels(self, fit: Fit) -> float | None:
-        """Return how well an explanation predicts an amplitude that it has not seen.
-
-        For each level the fit is continued on the training data of the other levels, and judged on
-        all realizations of that one.
-
-        Returns:
-            chi-square per degree of freedom, geometric mean over levels; None with one level.
-        """
-        levels = sorted(set(self._levels))
-        if len(levels) < 2:
-            return None
-        values = []
-        for level in levels:
-            others = [i for i in self.train.which if self._levels[i] != level]
-            seen, unseen = (
-                self._misfit(others),
-                self._misfit([i for i, at in enumerate(self._levels) if at == level]),
-            )
-            known = self._rows(fit, others)
-            reached = self._reached(fit.space, fit.solution.x, seen, _NESTED_STEPS, known)
-            values.append(unseen.chi2(fit.space.model(reached.x)))
-        return float(np.exp(np.mean(np.log(np.maximum(values, 1e-3)))))
-
-    def _rows(self, fit: Fit, which: Sequence[int]) -> np.ndarray:
+    def rows(self, fit: Fit, which: Sequence[int]) -> np.ndarray:
         """Return the rows of a fit's Jacobian that belong to some of the training realizations."""
         jacobian = fit.solution.jacobian
         by_realization = jacobian.reshape(len(self.train.which), -1, jacobian.shape[1])
         chosen = by_realization[[self.train.which.index(i) for i in which]]
         return chosen.reshape(-1, jacobian.shape[1])
 
-    def _reached(
+    def reached(
         self, space: Space, x: np.ndarray, misfit: Misfit, steps: int, known=None
     ) -> Solution:
         """Return where a few steps lead on some of the realizations."""
@@ -203,7 +180,7 @@ class Fitter:
         place = [self.train.which.index(i) for i in self._few]
         residuals = solution.residuals.reshape(size, -1)[place].ravel()
         return replace(
-            solution, residuals=residuals, jacobian=self._rows(parent, self._few),
+            solution, residuals=residuals, jacobian=self.rows(parent, self._few),
             cost=float(residuals @ residuals),
         )  # fmt: skip
 
@@ -257,7 +234,7 @@ class Fitter:
         if proposals[0][0] > NO_PROMISE * parent.train_chi2:
             return self._without_promise(parent, effect, names, proposals[0], give_up_above)
         fits: list[Fit] = []
-        for _, space, point in _different(proposals, _KEPT_STARTS):
+        for _, space, point in different(proposals, _KEPT_STARTS):
             limit = give_up_above
             fits.append(self.solve(names, space, point, limit, known=parent.solution.jacobian))
             left, most = fits[-1].train_chi2, _LITTLE * parent.train_chi2
@@ -321,14 +298,3 @@ class Fitter:
         model = space.model(solution.x)
         held = self.held.errors([model])[0]
         return Fit(effects, model, space, solution, solution.cost, float(held @ held))
-
-
-def _different(proposals: Sequence[Proposal], most: int) -> list[Proposal]:
-    """Return the best proposals that differ by more than a size, at the most `most`."""
-    kept: list[Proposal] = []
-    for proposal in proposals:
-        if all(proposal[1] is not other[1] for other in kept):
-            kept.append(proposal)
-        if len(kept) == most:
-            break
-    return kept

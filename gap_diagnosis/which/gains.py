@@ -77,6 +77,36 @@ def gain(
     )
 
 
+def fall(fitter: CellFitter, fit: CellFit, without: CellFit) -> float:
+    """Return by how much twice the negative log-likelihood of the fitted parts falls.
+
+    Args:
+        fitter: that made both.
+        fit: with an effect.
+        without: the fit that lacks it.
+    """
+    ratio = np.log(without.variance / fit.variance)
+    return max(float(fitter.weights.numbers(fit.variance) @ ratio), 0.0)
+
+
+def left_of(fitter: CellFitter, after: CellFit, before: CellFit) -> float:
+    """Return how much of the squared error on unseen parts one fit leaves of another's."""
+    left = [float(np.sum(fitter.weights.counts * fit.left)) for fit in (after, before)]
+    return left[0] / left[1]
+
+
+def closed(fitter: CellFitter, after: CellFit, before: CellFit) -> float:
+    """Return how much of what one fit leaves on unseen parts another closes, in one band.
+
+    The band is the one in which it gains most log-likelihood: a delay shows at high frequencies,
+    where little of the motion is.
+    """
+    weights = fitter.weights
+    left = [np.sum(weights.counts * fit.left, axis=0) for fit in (before, after)]
+    most = int(np.argmax(weights.gained(after.left, before.left).sum(axis=0)))
+    return float(1.0 - left[1][most] / left[0][most])
+
+
 def _p_value(gains: np.ndarray) -> float:
     """Return how often chance makes unseen parts gain as often and as much as they do.
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from fjr_sim_node import effects as fx
 
+from .cell_fits import CellFit, CellFitter
 from .fits import NO_PROMISE, RIPPLES_TRIED, Fit, Fitter
 from .reduced_fits import without
 from .screening import Screening
@@ -36,13 +39,30 @@ def with_second_harmonics(fitter: Fitter, fit: Fit) -> Fit:
     return fit
 
 
+def with_second_harmonic(fitter: CellFitter, fit: CellFit, ripple: str) -> CellFit | None:
+    """Return a fit of records with a second harmonic of a ripple; None if none promises any.
+
+    Args:
+        fitter: that made the fit.
+        fit: an explanation.
+        ripple: identifier of an angle-periodic effect of it, of one harmonic so far.
+    """
+    proposals = fitter.screening_of(fit, _seeds(ripple)).proposals()
+    found = fitter.add(fit, ripple, proposals, 1)
+    return None if found is None else replace(found, effects=fit.effects)
+
+
+def _seeds(effect: str) -> list[Mapping[str, float]]:
+    ratio, phase = f"{effect}.second_ratio", f"{effect}.second_phase_rad"
+    return [{ratio: 0.2, phase: angle} for angle in (0.0, 0.5 * np.pi)]
+
+
 def _second_harmonics(fitter: Fitter, fit: Fit, effect: str) -> list[_Start]:
     """Return where to start with a second harmonic of a ripple; nothing if none gains."""
-    ratio, phase = f"{effect}.second_ratio", f"{effect}.second_phase_rad"
     found = Screening(
         fit.solution,
         fit.model,
-        [{ratio: 0.2, phase: angle} for angle in (0.0, 0.5 * np.pi)],
+        _seeds(effect),
         partial(fitter.space, fit),
         fitter.errors,
     ).proposals()

@@ -27,6 +27,7 @@ from .estimates import (
     standard_errors,
     together_sure,
 )
+from .gains import fall
 
 LEAST_INVARIANCE_P = 0.01
 _SAME = 0.05  # relative: sizes that differ by no more are the same, since friction scatters
@@ -52,7 +53,7 @@ def cell_estimates(
     linear = linear_estimates(fit, np.sqrt(std**2 + moved**2 + form(fit, FORM_BESIDE) ** 2))
     if len(fit.effects) > 1:
         return linear
-    return kept_from_zero(linear, {e: fitter.fall(fit, other) for e, other in without.items()})
+    return kept_from_zero(linear, {e: fall(fitter, fit, other) for e, other in without.items()})
 
 
 def beyond_zero(effect: str, found: Mapping[str, Estimate], fall: float) -> bool:

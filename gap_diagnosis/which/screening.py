@@ -264,3 +264,14 @@ def _scales(name: str) -> bool:
 def is_size(name: str) -> bool:
     """Tell whether a parameter, by its full name, switches its effect or a part of it."""
     return fx.parameter(name).role in ("size", "limit", "harmonic")
+
+
+def different(proposals: Sequence[Proposal], most: int) -> list[Proposal]:
+    """Return the best proposals that differ by more than a size, at the most `most`."""
+    kept: list[Proposal] = []
+    for proposal in proposals:
+        if all(proposal[1] is not other[1] for other in kept):
+            kept.append(proposal)
+        if len(kept) == most:
+            break
+    return kept

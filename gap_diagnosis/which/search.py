@@ -20,6 +20,7 @@ from .harmonics import with_second_harmonics
 from .ranking import Ranking
 from .reduced_fits import without, without_scale
 from .screening import Proposal, Screening
+from .unseen_levels import across_levels
 
 _FINALISTS = 4
 _CLOSE = 2.0
@@ -64,7 +65,7 @@ class Search:
         scores = []
         for fit in close:
             self._progress(f"{' + '.join(fit.effects)} on unseen amplitudes")
-            amplitudes = self._fitter.across_levels(fit)
+            amplitudes = across_levels(self._fitter, fit)
             scores.append(self._found.misfit(fit) * (1.0 if amplitudes is None else amplitudes))
         best = close[scores.index(min(scores))]
         tied = [best, *self._found.tied(best)]

@@ -14,7 +14,8 @@ from fjr_sim_node import effects as fx
 
 from .cell_fits import CellFit, CellFitter
 from .equivalents import ONE_CAUSE, founded, holders, partners, plainness
-from .gains import Gain, gain, stands_for
+from .gains import Gain, closed, gain, left_of, stands_for
+from .harmonics import with_second_harmonic
 from .screening import Proposal, Screening
 
 MOST_CAUSES = 5
@@ -94,9 +95,9 @@ class Stepwise:
             fits = self._extended(found.best, found.steps[0])
             found.rivals[len(found.best.effects) + 1] = fits
             chosen = self._chosen(fits, found.best)
-            if chosen is None or self._fitter.closed(chosen, found.best) < self._least_closed(
-                found
-            ):
+            if chosen is None:
+                break
+            if closed(self._fitter, chosen, found.best) < self._least_closed(found):
                 break
             found.alternatives[chosen.effects[-1]] = self._tied(chosen, fits, found.best)
             found.steps.append(chosen)
@@ -173,7 +174,7 @@ class Stepwise:
         if not fx.EFFECTS[effect].ripple or self._fitter.misfit(fit) < _WORTH_A_HARMONIC:
             return fit
         self._progress(f"{' + '.join(fit.effects)}, second harmonic")
-        richer = self._fitter.second_harmonic(fit, effect)
+        richer = with_second_harmonic(self._fitter, fit, effect)
         return fit if richer is None or not self._gain(richer, fit).present else richer
 
     def _one_cause(self, parent: CellFit, refit: CellFit) -> list[str]:
@@ -189,7 +190,7 @@ class Stepwise:
         near any more, and all are screened anew. So are ripples, whose period depends on what is
         left.
         """
-        anew = self._first is None or self._fitter.left_of(parent, self._first[0]) < _OUTDATED
+        anew = self._first is None or left_of(self._fitter, parent, self._first[0]) < _OUTDATED
         if self._first is not None and not anew:
             before, screened = self._first
             promise = {

@@ -12,6 +12,7 @@ from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.record_investigation import RecordInvestigation, investigate_records
 from gap_diagnosis.which.cell_fits import CellFitter
 from gap_diagnosis.which.equivalents import founded
+from gap_diagnosis.which.gains import left_of
 from gap_diagnosis.which.presence import LEAST_INVARIANCE_P, invariance
 from gap_diagnosis.which.stepwise import Stepwise
 
@@ -64,7 +65,7 @@ def test_all_effects_are_screened_anew_once_a_cause_has_closed_most_of_the_error
 
     search = Stepwise(fitter, others)
     fitter.screening = lambda _, effect: looked.append(effect) or Noted()
-    assert fitter.left_of(fit, refit) < 0.1
+    assert left_of(fitter, fit, refit) < 0.1
     search._first = refit, dict.fromkeys(others, Noted())
     assert set(search._screened(fit, others)) == set(looked) == set(others)
 

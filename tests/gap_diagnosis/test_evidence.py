@@ -23,7 +23,7 @@ from gap_diagnosis.outcome.diagnosis import Figure
 from gap_diagnosis.which import unseen_friction
 from gap_diagnosis.which.cell_fits import CellFitter
 from gap_diagnosis.which.cell_weights import independent
-from gap_diagnosis.which.gains import Gain, gain
+from gap_diagnosis.which.gains import Gain, fall, gain
 from gap_diagnosis.which.presence import at_its_bound, beyond_zero, cell_estimates, invariance
 from gap_diagnosis.which.stepwise import Stepwise
 
@@ -132,7 +132,7 @@ def test_a_cause_is_fitted_beside_friction_that_scatters():
     found = cell_estimates(fit, fitter, SCATTER, {"torque_bias": refit})
     bias = found["torque_bias.torque_nm"]
     assert bias.low <= 1.5 <= bias.high and bias.high - bias.low < 0.3
-    assert beyond_zero("torque_bias", found, fitter.fall(fit, refit))
+    assert beyond_zero("torque_bias", found, fall(fitter, fit, refit))
     assert not at_its_bound(fit, "torque_bias")
 
 

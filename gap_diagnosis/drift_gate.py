@@ -11,11 +11,11 @@ from dataclasses import replace
 
 from fjr_records.records import RecordSet
 
-from ..model.evidence import Evidence
-from ..which.cell_fits import CellFit, CellFitter
-from ..which.gains import MOST_P, Gain, gain
-from ..which.stepwise import LEAST_CLOSED
-from .gate_checks import Gate
+from .gates.gate_checks import Gate
+from .model.evidence import Evidence
+from .which.cell_fits import CellFit, CellFitter
+from .which.gains import MOST_P, Gain, closed, gain
+from .which.stepwise import LEAST_CLOSED
 
 _DRIFT = "nonstationary"
 _NAME = f"{_DRIFT}.friction_per_s"
@@ -61,7 +61,7 @@ def _drift(fitter: CellFitter, refit: CellFit) -> tuple[Gain, float]:
     seconds = max(r.elapsed_s + r.samples / records.sample_rate_hz for r in records.records)
     seeds = [{_NAME: sign * _BEGINS / seconds} for sign in (1.0, -1.0)]
     fit = fitter.add(refit, _DRIFT, fitter.screening_of(refit, seeds).proposals())
-    if fit is None or fitter.closed(fit, refit) < LEAST_CLOSED:
+    if fit is None or closed(fitter, fit, refit) < LEAST_CLOSED:
         return Gain(0.0, 0.0, 0.0, 1.0), 0.0
     return gain(fitter, fit, refit), 100.0 * fit.model.effects[_NAME]
 
