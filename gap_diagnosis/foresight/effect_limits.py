@@ -83,9 +83,19 @@ def _scaled(name: str, value: float, factor: float) -> float:
 class EffectLimits:
     """Detection limits of effects beside one bare plant."""
 
-    def __init__(self, sight: Sight, nominal: Model, refit: BareRefit) -> None:
-        """Take what the experiment shows, the bare plant and what its refit takes over."""
+    def __init__(
+        self, sight: Sight, nominal: Model, refit: BareRefit, showing: float = 1.0
+    ) -> None:
+        """Take what the experiment shows, the bare plant and what its refit takes over.
+
+        Args:
+            sight: of the experiment.
+            nominal: the bare plant.
+            refit: of it.
+            showing: how many times as much as it needs to be named a limit shows.
+        """
         self._sight, self._nominal, self._refit = sight, nominal, refit
+        self._showing = showing
         self._bare = sight.errors([nominal])[0]
         self._shapes: dict[str, list[Shape]] = {}
         self._limits: dict[str, Limit] = {}
@@ -181,7 +191,7 @@ class EffectLimits:
         if not shape.strength:
             return math.inf
         start = shape.seed[shape.lead] / self._sight.scales.of(shape.lead)
-        value = _scaled(shape.lead, start, 1.0 / shape.strength)
+        value = _scaled(shape.lead, start, self._showing / shape.strength)
         return 1.0 / value if fx.parameter(shape.lead).role == "limit" else abs(value)
 
     def _limit(self, shape: Shape) -> Limit | None:
@@ -190,14 +200,15 @@ class EffectLimits:
             return None
         least, most = self._range(shape)
         if fx.parameter(shape.lead).role != "limit":  # a limit is felt from one size on
-            most = min(most, _MOST * max(1.0 / shape.strength, least))
+            most = min(most, _MOST * max(self._showing / shape.strength, least))
         ends = least, most = self._followed(shape, least), self._followed(shape, most)
-        slopes = self._searched(shape, 1.0 / shape.strength, ends, self._by_slopes)
+        slopes = self._searched(shape, self._showing / shape.strength, ends, self._by_slopes)
         if slopes is None:
             return None
         factor = max(slopes, least)
         left = self._by_refit(shape, factor)
-        if not _REFITTED < self._sight.strength(left) * slopes / factor < 1.0 / _REFITTED:
+        shown = self._sight.strength(left) / self._showing
+        if not _REFITTED < shown * slopes / factor < 1.0 / _REFITTED:
             found = self._searched(shape, slopes, ends, self._by_refit)
             if found is None:
                 return None
@@ -233,7 +244,7 @@ class EffectLimits:
             played = max(factor, least)
             return self._sight.strength(left(shape, played)) * factor / played
 
-        return size_showing(shown, 1.0, start, most)
+        return size_showing(shown, self._showing, start, most)
 
     def _by_slopes(self, shape: Shape, factor: float) -> np.ndarray:
         return self._refit.left(self._with(shape, factor) - self._bare)

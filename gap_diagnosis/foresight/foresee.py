@@ -41,6 +41,7 @@ def foresee(
     realizations: int | None = None,
     tolerance: float = TOLERANCE,
     effects: Sequence[str] | None = None,
+    showing: float = 1.0,
     progress: Progress = lambda *_: None,
 ) -> Foresight:
     """Say which parameters and effects a diagnosis of an experiment could show.
@@ -54,6 +55,8 @@ def foresee(
         tolerance: how far a datasheet value may be off, relative: a parameter counts as
             identifiable if its standard error is below.
         effects: identifiers to look at; None for the catalogue.
+        showing: sizes at which an effect shows so many times what a diagnosis needs, in place of
+            detection limits.
         progress: told which effect is looked at.
 
     Raises:
@@ -71,7 +74,7 @@ def foresee(
     else:
         kind, sight = "records", RecordSight(recorded, bare, realizations)
     refit = bare_refit(sight, bare)
-    limits = EffectLimits(sight, bare, refit)
+    limits = EffectLimits(sight, bare, refit, showing)
     found = []
     for number, name in enumerate(names):
         progress(number, len(names), name)

@@ -56,6 +56,17 @@ def test_an_effect_is_named_above_its_limit_and_not_below(effect):
     assert named == [[effect], []]
 
 
+def test_what_shows_ten_times_as_much_is_larger_and_a_limit_lower():
+    """A delay shows in proportion to itself; of a saturation less is needed the lower it lies."""
+    recorded, names = planned_record(planned(1e-4)), ["delay", "torque_saturation"]
+    once, often = (foresee(recorded, NOMINAL, effects=names, showing=k) for k in (1.0, 10.0))
+    ratio = {
+        a.effect: b.limit / a.limit for a, b in zip(once.effects, often.effects, strict=True)
+    }
+    assert ratio["delay"] == pytest.approx(10.0, rel=0.1)
+    assert 0.3 < ratio["torque_saturation"] < 0.99
+
+
 def test_a_plan_that_a_gate_would_stop_says_so():
     short = {"amplitudes_rad": (2e-3, 2e-2), "transient_periods": 1}
     for what, stopped in ((short, True), ({}, False)):
