@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import functools
 import os
+import resource
 import signal
 import tempfile
 import threading
@@ -26,6 +27,9 @@ _LONGEST = 200
 """Characters of an unexpected error that its sentence shows."""
 _WITHOUT_MEMORY = ("can't start new thread", "failed to map segment from shared object")
 """What the interpreter and the loader of libraries say then, without a type of error of its own."""
+_LEAST_BYTES = 512 * 2**20
+"""Least limit of a process' memory. Below, OpenBLAS may wait for ever for memory as it is loaded
+(seen at 450 MB on two cores; 550 MB are enough there for `fjr simulate`)."""
 
 
 def reports_errors(kept: str) -> Callable[[Command], Command]:
@@ -41,6 +45,7 @@ def reports_errors(kept: str) -> Callable[[Command], Command]:
     def decorate(command: Command) -> Command:
         @functools.wraps(command)
         def reporting(*args: Any, **options: Any) -> Any:
+            _refuse_little_memory()
             try:
                 with _ended_as_by_ctrl_c():
                     return command(*args, **options)
@@ -58,6 +63,17 @@ def reports_errors(kept: str) -> Callable[[Command], Command]:
         return reporting  # type: ignore[return-value]
 
     return decorate
+
+
+def _refuse_little_memory() -> None:
+    """End the command if its shell allows a process too little memory."""
+    allowed, _ = resource.getrlimit(resource.RLIMIT_AS)
+    if 0 <= allowed < _LEAST_BYTES:
+        leave(
+            f"A process may take {allowed // 2**20} MiB of memory here (ulimit -v), and fjr needs "
+            f"{_LEAST_BYTES // 2**20} MiB or more; raise that limit.",
+            FAILURE,
+        )
 
 
 @contextmanager

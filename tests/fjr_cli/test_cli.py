@@ -216,6 +216,16 @@ def test_low_memory_is_one_sentence_whoever_met_it(error, monkeypatch):
     assert done.stderr.startswith("The memory is not enough, or a process of fjr was killed for it")
 
 
+def test_too_low_a_limit_of_memory_is_told_before_anything_begins(tmp_path):
+    """OpenBLAS would wait for ever for memory as it is loaded."""
+    out = tmp_path / "bags"
+    command = f"ulimit -v 450000; exec {sys.executable} -m fjr_cli simulate --out {out}"
+    done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 1 and not out.exists()
+    assert done.stderr.startswith("A process may take 439 MiB of memory here (ulimit -v), and fjr ")
+    assert done.stderr.count("\n") == 1
+
+
 def test_unexpected_error_names_a_log_with_the_traceback(tmp_path, monkeypatch):
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     monkeypatch.delenv("FJR_DEBUG", raising=False)
