@@ -3,11 +3,14 @@
 Encoder noise is white, a motion of masses is not: it falls off by four powers of frequency in
 power. So the highest lines show the noise of the position where they are flat. Where a record
 stands still its own scatter shows it, and where a reference was played twice half the power of the
-difference does, line by line, friction that scatters from run to run included.
+difference does, line by line, friction that scatters from run to run included. An encoder that
+counts in steps rounds, which is noise of a variance of step^2/12 whatever else is seen: one that
+stands still reads the same count for ever.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -18,6 +21,7 @@ from scipy.signal import welch
 
 from fjr_interface.experiment import Experiment
 
+from .encoder_step import position_step
 from .records import Record, RecordSet
 
 NoiseSource = Literal["repeats", "standstill", "residual", "none"]
@@ -30,6 +34,7 @@ _LINE = 4  # bins from the middle of a line to its end in the spectrum's window
 _STILL_S = 0.2
 _STILL = 1e-3  # of the travelled range: the most that a standing axis moves
 _LEAST_STILL = 50  # samples
+_SCATTERS = 1e-9  # of the travelled range: less is the arithmetic's
 
 
 @dataclass(frozen=True)
@@ -38,11 +43,14 @@ class RecordNoise:
 
     Attributes:
         source: what it was found from; none if nothing shows it.
-        std_rad: standard deviation of one sample of white noise; NaN if not known.
+        std_rad: standard deviation of one sample of white noise, at least that of rounding; NaN if
+            not known.
+        step_rad: of the encoder; None where the positions show none.
     """
 
     source: NoiseSource
     std_rad: float
+    step_rad: float | None = None
 
     @property
     def known(self) -> bool:
@@ -52,6 +60,17 @@ class RecordNoise:
 
 def record_noise(records: RecordSet) -> RecordNoise:
     """Return the noise of the position, by the best evidence that the records hold."""
+    seen, step = _seen(records), position_step([r.position for r in records.records])
+    if step is None:
+        return seen
+    rounding = step / math.sqrt(12.0)
+    if not seen.known:
+        return RecordNoise("residual", rounding, step)
+    return RecordNoise(seen.source, max(seen.std_rad, rounding), step)
+
+
+def _seen(records: RecordSet) -> RecordNoise:
+    """Return the noise that scatter shows."""
     repeated = _of_differences([*_between_repeats(records), *_between_periods(records)])
     if repeated is not None:
         return RecordNoise("repeats", repeated)
@@ -152,7 +171,7 @@ def _standstill(record: Record) -> float | None:
     travel = float(np.ptp(position))
     still = pieces[np.ptp(pieces, axis=1) < _STILL * travel]
     scatter = [_detrended(piece) for piece in still]
-    scatter = [value for value in scatter if value > 0.0]
+    scatter = [value for value in scatter if value > _SCATTERS * travel]
     return float(np.median(scatter)) if scatter else None
 
 

@@ -234,6 +234,11 @@ def _does_as_well(
 
 def _notes(evidence: Evidence, found: Found) -> list[str]:
     notes = list(evidence.simulator.loop.notes)
+    step = evidence.noise.step_rad
+    if step is not None and evidence.noise.std_rad <= 1.01 * step / math.sqrt(12.0):
+        notes.append(
+            f"The encoder counts in steps of {step:.3g} rad; what it rounds away counts as noise."
+        )
     if not evidence.noise.known:
         notes.append(
             "The noise of the position is not known: no repeats, no standstill, and the highest "

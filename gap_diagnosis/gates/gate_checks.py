@@ -215,7 +215,7 @@ def _periodic(recorded: RecordedExperiment) -> Gate:
 
 
 def _settled(recorded: RecordedExperiment) -> Gate:
-    step = position_step(recorded) or 0.0
+    step = position_step([r.position for r in recorded.realizations]) or 0.0
 
     def left(r: RecordedRealization) -> float:
         kept = r.kept(r.position)

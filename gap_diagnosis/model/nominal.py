@@ -61,7 +61,7 @@ def read_nominal(source: str | Path) -> dict[str, float]:
     Args:
         source: `paper`, or a ROS parameter file that names them under /rig/simulator. Friction and
             k1 that it leaves out are zero: the datasheet lacks them. Without j and k0, or with an
-            infinite k0, the axis is rigid, and jm is all its inertia but for j.
+            infinite k0, the axis is rigid, and jm is all its inertia but for j, which may be zero there.
 
     Raises:
         InputError: no such file, no simulator in it, an unknown name, an inertia or a stiffness
@@ -75,6 +75,8 @@ def read_nominal(source: str | Path) -> dict[str, float]:
             f"{source}: /rig/simulator is missing; write the datasheet's values below it."
         )
     where = f"{source}: /rig/simulator"
+    if given.get("j") == 0.0 and given.get("k0", math.inf) == math.inf:
+        given = {name: value for name, value in given.items() if name != "j"}
     checked = SIMULATOR.check(given, where)
     rigid = math.isinf(checked["k0"]) if "k0" in given else "j" not in given
     needed = ("jm",) if rigid else ("jm", "j", "k0")

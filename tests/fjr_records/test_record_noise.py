@@ -67,6 +67,27 @@ def test_a_standstill_shows_noise():
     assert found.source == "standstill" and found.std_rad == pytest.approx(STD, rel=0.2)
 
 
+@pytest.mark.parametrize("zero", [0.0, 0.12345678])
+def test_an_encoder_that_stands_still_on_one_count_is_not_without_noise(zero):
+    """It rounds: a variance of step^2/12, whatever the standstill or repeats show."""
+    step = 1e-4
+    moving = np.cumsum(smooth(np.random.default_rng(3), 3000))
+    whole = np.concatenate([moving, np.full(1500, moving[-1])])
+    position = np.round(whole / step) * step + zero
+    again = [whole, whole]
+    for references in (None, again):
+        found = record_noise(records(position, position, references=references))
+        assert found.step_rad == pytest.approx(step)
+        assert found.known and 0.9 < found.std_rad * np.sqrt(12.0) / step < 1.6
+
+
+def test_noise_above_the_step_counts_as_it_is():
+    rng = np.random.default_rng(6)
+    position = smooth(rng, 8000) + STD * rng.standard_normal(8000)
+    found = record_noise(records(np.round(position / 1e-6) * 1e-6))
+    assert found.std_rad == pytest.approx(STD, rel=0.15)
+
+
 def test_a_motion_up_to_the_highest_lines_shows_no_noise():
     rng = np.random.default_rng(4)
     falling = sosfilt(butter(1, 2.0, fs=RATE, output="sos"), rng.standard_normal(8000))

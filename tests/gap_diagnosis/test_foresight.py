@@ -60,9 +60,7 @@ def test_what_shows_ten_times_as_much_is_larger_and_a_limit_lower():
     """A delay shows in proportion to itself; of a saturation less is needed the lower it lies."""
     recorded, names = planned_record(planned(1e-4)), ["delay", "torque_saturation"]
     once, often = (foresee(recorded, NOMINAL, effects=names, showing=k) for k in (1.0, 10.0))
-    ratio = {
-        a.effect: b.limit / a.limit for a, b in zip(once.effects, often.effects, strict=True)
-    }
+    ratio = {a.effect: b.limit / a.limit for a, b in zip(once.effects, often.effects, strict=True)}
     assert ratio["delay"] == pytest.approx(10.0, rel=0.1)
     assert 0.3 < ratio["torque_saturation"] < 0.99
 

@@ -28,6 +28,16 @@ def test_paper_and_a_whole_file_are_read(tmp_path):
     assert read_nominal(write(tmp_path, other)) == other
 
 
+def test_a_rigid_axis_may_have_no_link_at_all(tmp_path):
+    """Zero inertia is none, where no transmission drives it; a flexible joint needs one."""
+    alone = {"jm": 90.0, "j": 0.0}
+    for given in ({**alone, "k0": math.inf}, alone):
+        found = read_nominal(write(tmp_path, given))
+        assert Model.nominal(found).rigid and found["jm"] + found["j"] == 90.0
+    with pytest.raises(InputError, match="j must lie in"):
+        read_nominal(write(tmp_path, {**alone, "k0": 900.0}))
+
+
 def test_a_campaign_file_with_all_effects_off_is_a_nominal(tmp_path):
     off = {"backlash.half_gap_rad": 0.0, "torque_saturation.limit_nm": math.inf}
     file = write(tmp_path, {**PAPER, **off, "noise_std_rad": 1e-5, "sample_rate_hz": 1000.0})

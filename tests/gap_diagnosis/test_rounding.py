@@ -11,6 +11,7 @@ from gap_cases import simulate_case
 from bla_analyzer.checks import TRANSIENT_LIMIT
 from fjr_records.encoder_step import position_step
 from fjr_records.noise import noise_levels
+from fjr_records.periodic import RecordedExperiment
 from fjr_records.realization import unsettled
 from fjr_sim_node.plant import PLANT
 from gap_diagnosis.model.misfit import Misfit
@@ -24,20 +25,24 @@ STEP = 6e-4
 SHORT = {"base_frequency_hz": 0.5, "levels_rad": (4e-3, 1.2e-2), "transient_periods": 2}
 
 
+def step_of(recorded: RecordedExperiment) -> float | None:
+    return position_step([r.position for r in recorded.realizations])
+
+
 @pytest.fixture(scope="module")
 def coarse():
     return simulate_case({f"{ROUNDING}.resolution_rad": STEP}, seed=5, **SHORT)
 
 
 def test_the_step_is_read_from_the_record(coarse):
-    assert position_step(coarse.recorded) == pytest.approx(STEP, rel=1e-9)
+    assert step_of(coarse.recorded) == pytest.approx(STEP, rel=1e-9)
 
 
 def test_the_step_is_read_where_the_lowest_level_has_a_few_counts_only():
     case = simulate_case({f"{ROUNDING}.resolution_rad": 5e-3}, seed=5, **SHORT)
     fewest = min(np.unique(r.position).size for r in case.recorded.realizations)
     assert fewest < 20
-    assert position_step(case.recorded) == pytest.approx(5e-3, rel=1e-9)
+    assert step_of(case.recorded) == pytest.approx(5e-3, rel=1e-9)
 
 
 def test_rounding_that_locks_in_some_periods_is_no_transient():
@@ -53,9 +58,9 @@ def test_rounding_that_locks_in_some_periods_is_no_transient():
 
 def test_a_record_with_noise_or_of_few_values_has_no_step():
     fine = simulate_case(seed=5, **SHORT).recorded
-    assert position_step(fine) is None
+    assert step_of(fine) is None
     still = [replace(r, position=np.zeros_like(r.position)) for r in fine.realizations]
-    assert position_step(replace(fine, realizations=tuple(still))) is None
+    assert step_of(replace(fine, realizations=tuple(still))) is None
 
 
 def test_rounding_has_the_variance_of_a_uniform_error():
