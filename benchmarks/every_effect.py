@@ -13,6 +13,7 @@ import sys
 from collections.abc import Mapping
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from multiprocessing import get_context
 
 import numpy as np
 from machine import describe
@@ -106,7 +107,7 @@ def main() -> None:
     for kind in kinds:
         cases, not_shown = cases_of(kind)
         right = 0
-        with ProcessPoolExecutor(2) as pool:
+        with ProcessPoolExecutor(2, get_context("spawn")) as pool:
             for case, verdict, sets, present in pool.map(judged, cases):
                 hit = any(case.effect in names for names in sets)
                 right += hit

@@ -22,15 +22,16 @@ def import_records(
         ),
     ],
     column_map: Annotated[
-        list[str],
+        list[str] | None,
         typer.Option(
             "--map",
             metavar="SIGNAL=[-]COLUMN[:UNIT]",
             help="Column of torque and position, perhaps of reference, link and time, separated by "
             "commas, by name or by number from 0: position=theta:deg,torque=iq:0.25,time=t:ms. The "
-            "unit may be a factor; a minus turns the sign.",
+            "unit may be a factor; a minus turns the sign. Without it, what the first file holds "
+            "is listed.",
         ),
-    ],
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option(metavar="FOLDER", help="New experiment folder; needed without --dry-run."),
@@ -82,8 +83,16 @@ def import_records(
     from fjr_records.importers.importer import read_files, write_bags
     from fjr_records.importers.record_file import ImportOptions
 
-    from .import_summary import summary
+    from .import_summary import held_by, summary
 
+    if column_map is None and out is not None:
+        raise InputError(
+            f"--map is missing: name the columns; `fjr import {files[0]}` lists what it holds."
+        )
+    if column_map is None:
+        for line in held_by(files[0]):
+            typer.echo(line)
+        return
     if out is None and not dry_run:
         raise InputError("name the experiment folder with --out, or look first with --dry-run.")
     if out is not None and (out.exists() or out.is_symlink()):

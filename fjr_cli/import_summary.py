@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 
 import numpy as np
 
 from fjr_interface.experiment import Experiment, RecordDescription
+from fjr_records.importers.columns import held_columns
 from fjr_records.importers.import_map import Column
 from fjr_records.importers.importer import Understood
 from fjr_records.importers.record_file import SYMBOLS, Record
@@ -14,6 +16,23 @@ from fjr_records.importers.repetition import Repetition
 
 _UNITS = {"reference": "rad", "torque": "N m", "position": "rad", "link": "rad"}
 _LINEAR_UNITS = {"reference": "m", "torque": "N", "position": "m", "link": "m"}
+
+
+def held_by(path: Path) -> Iterator[str]:
+    """Yield the lines that say what a file holds, for those who must name its columns."""
+    columns = held_columns(path)
+    yield f"{path.name} holds"
+    width = max((len(one.name) for one in columns), default=0)
+    for one in columns:
+        shape = " x ".join(map(str, one.shape)) or "1"
+        values = "no real numbers, or not all finite"
+        if one.range is not None:
+            values = f"from {one.range[0]:.6g} to {one.range[1]:.6g}"
+        yield f"  {one.name:<{width}}  {shape:>10}  {values}"
+    yield (
+        "Nothing was written. Next: name the columns of torque and position, perhaps of reference "
+        "and time: --dry-run --map torque=COLUMN:UNIT,position=COLUMN:UNIT,time=COLUMN:s"
+    )
 
 
 def summary(understood: Understood, columns: Mapping[str, Column]) -> Iterator[str]:

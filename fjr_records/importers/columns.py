@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -12,6 +14,8 @@ from fjr_kit.errors import InputError
 
 from . import json_log, mat, npz, text
 from .source import Names, refuse_bomb, sample_axis
+
+Result = TypeVar("Result")
 
 READERS: dict[str, Callable[[Path], Names]] = {
     ".mat": mat.open_mat,
@@ -46,6 +50,54 @@ def read_columns(path: str | Path, names: Sequence[str]) -> dict[str, np.ndarray
             column holds something that is not a finite real number.
     """
     path = Path(path)
+
+    def numbers(found: Names) -> dict[str, np.ndarray]:
+        return {name: _numbers(path, name, found.column(name)) for name in names}
+
+    return _of_file(path, numbers)
+
+
+@dataclass(frozen=True)
+class Held:
+    """A column, a matrix of signals or a number that a file holds.
+
+    Attributes:
+        name: by which it is read.
+        shape: of the array.
+        range: least and greatest value; None where it does not hold finite real numbers.
+    """
+
+    name: str
+    shape: tuple[int, ...]
+    range: tuple[float, float] | None
+
+
+def held_columns(path: str | Path, most: int = 200) -> list[Held]:
+    """Return what a file holds, in its order; raise InputError if it cannot be read.
+
+    Args:
+        path: the file, as for `read_columns`.
+        most: how many names are looked at.
+    """
+
+    def held(found: Names) -> list[Held]:
+        return [_held(name, found) for name in found.known[:most]]
+
+    return _of_file(Path(path), held)
+
+
+def _held(name: str, found: Names) -> Held:
+    try:
+        values = np.asarray(found.find(name))
+    except InputError:  # a damaged column, or a name that is there twice: said when it is asked for
+        return Held(name, (), None)
+    if values.dtype.kind not in "fiub" or not values.size or not np.isfinite(values).all():
+        return Held(name, values.shape, None)
+    return Held(name, values.shape, (float(values.min()), float(values.max())))
+
+
+def _of_file(path: Path, use: Callable[[Names], Result]) -> Result:
+    """Return what is made of an open file; raise InputError if it cannot be read."""
     suffixes = [suffix.lower() for suffix in path.suffixes[-2:]]
     packed = suffixes[-1:] == [".gz"]
     suffix = suffixes[-2] if packed and len(suffixes) > 1 else path.suffix.lower()
@@ -57,8 +109,7 @@ def read_columns(path: str | Path, names: Sequence[str]) -> dict[str, np.ndarray
     if not path.is_file():
         raise InputError(f"{path}: there is no such file.")
     try:
-        found = READERS[suffix](path)
-        return {name: _numbers(path, name, found.column(name)) for name in names}
+        return use(READERS[suffix](path))
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror or error}).") from None
     except RecursionError:

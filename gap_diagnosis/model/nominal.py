@@ -61,7 +61,7 @@ def read_nominal(source: str | Path) -> dict[str, float]:
     Args:
         source: `paper`, or a ROS parameter file that names them under /rig/simulator. Friction and
             k1 that it leaves out are zero: the datasheet lacks them. Without j and k0, or with an
-            infinite k0, the axis is rigid, and jm is all its inertia but for j, which may be zero there.
+            infinite k0, the axis is rigid, and jm is all its inertia but for j, which may be zero.
 
     Raises:
         InputError: no such file, no simulator in it, an unknown name, an inertia or a stiffness

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.io import savemat
 
 from fjr_kit.errors import InputError
-from fjr_records.importers.columns import READERS, read_columns
+from fjr_records.importers.columns import READERS, held_columns, read_columns
 
 T = np.arange(40) / 100.0
 R, Y = np.sin(7 * T), 0.5 * np.sin(7 * T - 0.3)
@@ -56,6 +56,27 @@ def test_text(tmp_path, name):
         read_columns(tmp_path / name, list(names)).values(), (R, Y), strict=True
     ):
         np.testing.assert_array_equal(found, expected)
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_what_a_text_holds_can_be_read_by_the_names_that_are_listed(tmp_path, name):
+    text, _ = TEXTS[name]
+    write = gzip.compress if name.endswith(".gz") else bytes
+    (tmp_path / name).write_bytes(write(text.encode()))
+    held = held_columns(tmp_path / name)
+    read = read_columns(tmp_path / name, [one.name for one in held])
+    assert len(held) == 3
+    for one, column in zip(held, read.values(), strict=True):
+        assert one.shape == (40,) and one.range == (column.min(), column.max())
+
+
+def test_what_a_mat_file_holds_is_listed_whatever_it_is(tmp_path):
+    bad = np.array([1.0, np.nan])
+    content = {"rec": {"pos": np.array([R, Y]), "who": "me"}, "k": 3.0, "bad": bad}
+    savemat(tmp_path / "run.mat", content)
+    held = {one.name: (one.shape, one.range) for one in held_columns(tmp_path / "run.mat")}
+    assert held["rec.pos"] == ((2, 40), (min(R.min(), Y.min()), max(R.max(), Y.max())))
+    assert held["bad"] == ((2,), None)
 
 
 @pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "latin-1"])

@@ -387,3 +387,14 @@ def test_an_angle_in_degrees_that_is_taken_for_rad_is_refused(tmp_path, quantity
         read_files([file], options())
     in_degrees = [f"{spec}:deg" if spec.startswith(quantity) else spec for spec in MAP]
     assert read_files([file], options(*in_degrees)).records[0].doubts == ()
+
+
+def test_without_a_map_a_file_says_what_it_holds_and_nothing_is_written(tmp_path, run):
+    file = tmp_path / "run.csv"
+    file.write_text("t,cmd,enc\n0.0,1.5,2.0\n0.1,-1.5,3.0\n")
+    done = run("import", file)
+    assert done.exit_code == 0 and [path.name for path in tmp_path.iterdir()] == ["run.csv"]
+    assert re.search(r"cmd +2  from -1.5 to 1.5", done.output) and "--map" in done.output
+    done = run("import", file, "--out", tmp_path / "rig")
+    assert done.exit_code == 2 and "--map is missing" in done.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["run.csv"]
