@@ -35,6 +35,7 @@ _STILL_S = 0.2
 _STILL = 1e-3  # of the travelled range: the most that a standing axis moves
 _LEAST_STILL = 50  # samples
 _SCATTERS = 1e-9  # of the travelled range: less is the arithmetic's
+_QUIETEST = 0.1  # of the pieces that stand still: in others the motion may still settle
 
 
 @dataclass(frozen=True)
@@ -60,23 +61,23 @@ class RecordNoise:
 
 def record_noise(records: RecordSet) -> RecordNoise:
     """Return the noise of the position, by the best evidence that the records hold."""
-    seen, step = _seen(records), position_step([r.position for r in records.records])
-    if step is None:
-        return seen
-    rounding = step / math.sqrt(12.0)
-    if not seen.known:
+    step = position_step([r.position for r in records.records])
+    rounding = 0.0 if step is None else step / math.sqrt(12.0)
+    seen = _seen(records, rounding)
+    if not seen.known and step is not None:
         return RecordNoise("residual", rounding, step)
     return RecordNoise(seen.source, max(seen.std_rad, rounding), step)
 
 
-def _seen(records: RecordSet) -> RecordNoise:
-    """Return the noise that scatter shows."""
+def _seen(records: RecordSet, rounding: float) -> RecordNoise:
+    """Return the noise that scatter shows; what stands still without any shows that of rounding."""
     repeated = _of_differences([*_between_repeats(records), *_between_periods(records)])
     if repeated is not None:
         return RecordNoise("repeats", repeated)
     still = [s for s in map(_standstill, records.records) if s is not None]
-    if still:
-        return RecordNoise("standstill", float(np.sqrt(np.mean(np.square(still)))))
+    scatter = float(np.sqrt(np.mean(np.square(still)))) if still else 0.0
+    if still and max(scatter, rounding) > 0.0:
+        return RecordNoise("standstill", scatter)
     found = [floor for floor in (_floor(r.position) for r in records.records) if floor is not None]
     if found:
         return RecordNoise("residual", float(np.median(found)))
@@ -160,7 +161,10 @@ def _steps(difference: np.ndarray) -> float | None:
 
 
 def _standstill(record: Record) -> float | None:
-    """Return the scatter of the position where the axis stands; None if it never does."""
+    """Return the scatter of the position where the axis stands; None if it never does.
+
+    Zero if it reads the same value there for ever.
+    """
     rate = record.description.sample_rate_hz
     length = max(int(_STILL_S * rate), _LEAST_STILL)
     position = record.position
@@ -170,9 +174,10 @@ def _standstill(record: Record) -> float | None:
     pieces = position[: count * length].reshape(count, length)
     travel = float(np.ptp(position))
     still = pieces[np.ptp(pieces, axis=1) < _STILL * travel]
-    scatter = [_detrended(piece) for piece in still]
-    scatter = [value for value in scatter if value > _SCATTERS * travel]
-    return float(np.median(scatter)) if scatter else None
+    if not len(still):
+        return None
+    scatter = float(np.quantile([_detrended(piece) for piece in still], _QUIETEST))
+    return scatter if scatter > _SCATTERS * travel else 0.0
 
 
 def _detrended(piece: np.ndarray) -> float:

@@ -7,7 +7,7 @@ and position it must make the recorded torque. Unknown gains are solved from the
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -23,6 +23,11 @@ Loop = Literal["known", "gains_fitted", "unknown"]
 
 FOLLOWS = 0.98
 """Share of the torque's variance that a controller must explain for its loop to be simulated."""
+GROWS = 20.0
+"""Relative change of the simulated motion over that of an inertia, above which the loop is erratic:
+of the random rigs of the blind check none exceeds 3.3, a loop that swings has a hundred or more."""
+_SHOWN = 3
+"""Most names of runs that a sentence shows."""
 EXACT = 0.9999
 """Share below which a reader is told that the controller is not the whole truth."""
 
@@ -79,6 +84,31 @@ def loop_of(records: RecordSet) -> RecordLoop:
     kind: Loop = "unknown" if not follow else "gains_fitted" if gains else "known"
     chosen = tuple(laws[r.name] if r.name in follow else None for r in runs)
     return RecordLoop(kind, chosen, tuple(notes))
+
+
+def without_erratic(loop: RecordLoop, names: Sequence[str], growth: Sequence[float]) -> RecordLoop:
+    """Return the loop, not known of the runs in which small differences grow.
+
+    Where a datasheet lacks all friction, say, the loop that is simulated may swing without end; no
+    fit finds its way from there to a rig that does not.
+
+    Args:
+        loop: of the records.
+        names: of the records.
+        growth: see `GROWS`; 0 where no law is known.
+    """
+    erratic = [value > GROWS for value in growth]
+    if not any(erratic):
+        return loop
+    out = [name for name, grows in zip(names, erratic, strict=True) if grows]
+    where = ", ".join(out) if len(out) <= _SHOWN else f"{len(out)} of {len(names)} runs"
+    laws = tuple(None if grows else law for law, grows in zip(loop.laws, erratic, strict=True))
+    note = (
+        f"By the datasheet the loop of {where} swings so that small differences grow "
+        f"({max(growth):.2g} times), so there the recorded torque drives the model."
+    )
+    kind: Loop = loop.kind if any(law is not None for law in laws) else "unknown"
+    return replace(loop, kind=kind, laws=laws, notes=(*loop.notes, note))
 
 
 def _law(record: Record, rate: float, gains: Mapping[str, float]) -> TransferFunction:

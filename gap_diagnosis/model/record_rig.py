@@ -18,9 +18,10 @@ from fjr_records.records import Record, RecordSet
 from fjr_sim_node.simulation.closed_loop import Trajectory, simulate_law
 
 from .prediction import CROSSOVER_SHARE, model_observer
-from .record_loop import RecordLoop, loop_of
+from .record_loop import RecordLoop, loop_of, without_erratic
 from .simulated_rig import Model, run_parallel, too_stiff
 
+_SMALL = 1e-4  # relative: a change of an inertia that must not grow
 _AT_REST = 5.0  # standard deviations of noise that a record at rest may begin away from zero
 _FIRST_SAMPLES, _HIGHEST_DEGREE = 10, 4
 _ONLY_NOISE = 1.1  # standard deviations that a fit to the first samples leaves by chance
@@ -109,6 +110,19 @@ class RecordSimulator:
             else None
             for law, r, start in zip(self.loop.laws, records.records, self._starts, strict=True)
         ]
+        names = [r.name for r in records.records]
+        self.loop = without_erratic(self.loop, names, self._growth(Model.nominal(nominal)))
+
+    def _growth(self, nominal: Model) -> list[float]:
+        """Return how a small change of the inertia grows in each run, see `GROWS`."""
+        other = Model({**nominal.plant, "jm": nominal.plant["jm"] * (1.0 + _SMALL)}, {})
+        which = [index for index, law in enumerate(self.loop.laws) if law is not None]
+        growth = [0.0] * len(self.loop.laws)
+        for index, one, two in zip(which, *self.run([nominal, other], which), strict=True):
+            change = float(np.sqrt(np.mean((two[0] - one[0]) ** 2)))
+            moved = float(np.sqrt(np.mean(one[0] ** 2))) + 1e-300
+            growth[index] = change / moved / _SMALL if np.isfinite(change) else np.inf
+        return growth
 
     def response(self, frequency_hz: np.ndarray, index: int) -> np.ndarray:
         """Return C_y of what holds a run: its controller, or the observer; complex, N m/rad."""

@@ -67,6 +67,18 @@ def test_a_standstill_shows_noise():
     assert found.source == "standstill" and found.std_rad == pytest.approx(STD, rel=0.2)
 
 
+def test_a_motion_that_settles_does_not_stand_still():
+    """An axis creeps to its place after each move, by less than a thousandth of what it moved."""
+    rng = np.random.default_rng(7)
+    time = np.arange(2000) / RATE
+    settling = 5e-3 * np.exp(-time / 0.4)
+    moves = [np.cumsum(smooth(rng, 500)) for _ in range(3)]
+    position = np.concatenate([np.append(move, move[-1] + settling) for move in moves])
+    position += STD * rng.standard_normal(position.size)
+    found = record_noise(records(position))
+    assert found.source == "standstill" and found.std_rad == pytest.approx(STD, rel=0.2)
+
+
 @pytest.mark.parametrize("zero", [0.0, 0.12345678])
 def test_an_encoder_that_stands_still_on_one_count_is_not_without_noise(zero):
     """It rounds: a variance of step^2/12, whatever the standstill or repeats show."""
