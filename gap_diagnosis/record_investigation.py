@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from fjr_kit.errors import InputError
+from fjr_records.driven import wrong_sign
 from fjr_records.records import Record, RecordSet
 
 from .gates.bag_deviations import GROUPS
@@ -42,6 +43,8 @@ LEAST_SAMPLES = 64
 LONGEST_S = 300.0
 """Of all records together, what is played at the most (s)."""
 
+_SHOWN = 3
+"""Most runs of which the same is said."""
 _SEARCH_SHARE = 0.6
 """Of the budget for the search; the tests of what it found take about as long as one more step."""
 
@@ -234,6 +237,8 @@ def _does_as_well(
 
 def _notes(evidence: Evidence, found: Found) -> list[str]:
     notes = list(evidence.simulator.loop.notes)
+    doubted = [(r.name, wrong_sign(r.torque, r.position)) for r in evidence.records.records]
+    notes += [f"{name}: {doubt}." for name, doubt in doubted if doubt is not None][:_SHOWN]
     step = evidence.noise.step_rad
     if step is not None and evidence.noise.std_rad <= 1.01 * step / math.sqrt(12.0):
         notes.append(

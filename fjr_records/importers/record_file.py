@@ -10,12 +10,14 @@ import numpy as np
 
 from fjr_kit.errors import InputError
 
+from ..driven import wrong_sign
 from ..units import may_stick
 from . import coherence
 from .columns import read_columns
 from .import_map import Column
 from .repetition import Repetition, find_repetition
 from .stamps import LONGEST_S, Timing, read_timing, resample
+from .wraps import without_wraps
 
 SYMBOLS = {"reference": "r", "torque": "u", "position": "y", "link": "q"}
 LEAST_SAMPLES = 16
@@ -112,6 +114,8 @@ def read_samples(path: Path, options: ImportOptions) -> Samples:
         for quantity in unsigned
     )
     values = {q: column.factor * arrays[column.name] for q, column in columns.items()}
+    values, turns = without_wraps(values)
+    notes += turns
     size = values["position"].size
     if options.repeat_reference and 0 < values.get("reference", np.empty(0)).size <= size:
         values["reference"] = np.resize(values["reference"], size)
@@ -169,6 +173,9 @@ def understand(samples: Samples, rate_hz: float, options: ImportOptions) -> Reco
     doubts = _unit_doubts(path, signals, repetition, options.columns)
     if not np.ptp(signals["u"]) > 0:
         doubts += ("the torque is constant, so no response can be told from this run",)
+    brakes = wrong_sign(signals["u"], signals["y"])
+    if brakes is not None:
+        doubts += (f"{brakes}: --map torque=-COLUMN turns it",)
     other = coherence.unrelated(signals, repetition)
     if other is not None:
         raise InputError(f"{path}: {other}.")

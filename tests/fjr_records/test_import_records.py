@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fjr_interface.bags.reader import audit, find_bags, read_record
+from fjr_interface.bags.reader import SignalMap, audit, find_bags, read_record
 from fjr_interface.experiment import Experiment, RecordDescription
 from fjr_kit.errors import InputError
 from fjr_records.importers import coherence
@@ -398,3 +398,19 @@ def test_without_a_map_a_file_says_what_it_holds_and_nothing_is_written(tmp_path
     done = run("import", file, "--out", tmp_path / "rig")
     assert done.exit_code == 2 and "--map is missing" in done.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["run.csv"]
+
+
+def test_an_angle_that_wraps_and_a_torque_of_the_wrong_sign_are_told(tmp_path, run):
+    time = np.arange(4000) / 500.0
+    angle = 9.0 * np.sin(0.8 * time) + 2.5 * time
+    speed = np.gradient(angle, time)
+    torque = -(np.gradient(speed, time) + speed)
+    rows = np.array([time, np.degrees(np.mod(angle, 2.0 * np.pi)), torque]).T
+    np.savetxt(tmp_path / "run.csv", rows, delimiter=",", header="t,q,u", comments="")
+    mapped = ("--map", "position=q:deg,torque=u,time=t", "--out", tmp_path / "rig")
+    done = run("import", tmp_path / "run.csv", *mapped)
+    assert done.exit_code == 0 and "turns were added" in done.output
+    assert "the torque brakes the motion" in done.stderr
+    (bag,) = find_bags(tmp_path / "rig")
+    position = read_record(bag, SignalMap.parse(["reference=none"])).position
+    assert np.abs(position - angle - (position - angle)[0]).max() < 1e-9
