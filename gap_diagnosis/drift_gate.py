@@ -13,6 +13,7 @@ from fjr_records.records import RecordSet
 
 from .gates.gate_checks import Gate
 from .model.evidence import Evidence
+from .model.simulated_rig import Model
 from .which.cell_fits import CellFit, CellFitter
 from .which.gains import MOST_P, Gain, closed, gain
 from .which.stepwise import LEAST_CLOSED
@@ -31,9 +32,9 @@ def drift_gate(fitter: CellFitter, refit: CellFit) -> Gate:
         fitter: of the runs.
         refit: fit of the base parameters alone.
     """
-    anew = CellFitter(
-        Evidence(_anew(fitter.evidence.records), fitter.nominal), fitter.nominal, fitter.tolerance
-    )
+    whole = Model(fitter.nominal, {}).whole_plant
+    evidence = Evidence(_anew(fitter.evidence.records), whole)
+    anew = CellFitter(evidence, fitter.nominal, fitter.tolerance)
     tried = [_drift(fitter, refit), _drift(anew, anew.refit())]
     found, change = max(tried, key=lambda one: one[0].mean)
     drifts = found.present and change != 0.0

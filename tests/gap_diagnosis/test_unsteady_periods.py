@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -107,3 +108,17 @@ def test_a_transient_is_no_drift():
     assert found.diagnosis.verdict == "bad_data"
     assert any("still transient" in note for note in found.diagnosis.notes)
     assert found.gates.gates[-1].name == "stationary within runs" and found.gates.gates[-1].passed
+
+
+def test_a_drift_of_a_rigid_axis_is_told_from_a_transient():
+    rigid = {"jm": 0.5, "fsm": 11.0, "fvm": 6.0}
+    plant = {"k0": math.inf, "k1": 0.0, "jm": 0.3, "j": 0.2}
+    recorded = simulate_case(
+        {"nonstationary.friction_per_s": -0.01}, seed=4, realizations=3, plant=plant, off=0.0,
+        **{**SHORT, **NO_FREE_LINES},
+    ).recorded  # fmt: skip
+    nominal = dict.fromkeys(PLANT.names, 0.0) | rigid | {"k0": math.inf}
+    found = investigate_any(recorded, nominal, effects=KNOWN)
+    assert found.gates.only_unsteady
+    assert found.gates.gates[-1].name == "stationary within runs"
+    assert found.diagnosis.verdict == "nonstationary"
