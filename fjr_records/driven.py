@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 BRAKES = -0.1
-"""Correlation of torque and velocity below which nothing passive can have moved: of some sixty
-random rigs and real machines none has less than -0.03, by a late drive."""
+"""Correlation of torque and velocity below which nothing passive can have moved: of the runs of 44
+emulated rigs none has less than -0.03, by a late drive."""
 
 
 def drives(torque: np.ndarray, position: np.ndarray) -> float:

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 
 import numpy as np
 
-_TURN = 2.0 * np.pi
 _SMOOTH = 0.25 * np.pi  # rad: what an angle moves at the most from sample to sample once unwrapped
 _ANGLES = ("position", "link", "reference")
 

@@ -25,7 +25,7 @@ FOLLOWS = 0.98
 """Share of the torque's variance that a controller must explain for its loop to be simulated."""
 GROWS = 20.0
 """Relative change of the simulated motion over that of an inertia, above which the loop is erratic:
-of the random rigs of the blind check none exceeds 3.3, a loop that swings has a hundred or more."""
+of 16 random rigs of the blind check none exceeds 3.3, loops that swing had a hundred or more."""
 _SHOWN = 3
 """Most names of runs that a sentence shows."""
 EXACT = 0.9999
