@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 
 import pytest
+from by_hand import stamp_ns
 from graph_runs import campaign, contents, in_batch, in_graph
 from processes import Starter, marked_processes, node_pid, wait_for
 from ros_domain import Peer
@@ -224,9 +225,9 @@ def test_a_late_foreign_recorder_does_not_disturb_and_gets_the_description(
     folder = tmp_path / "campaign"
     options = ["--out", str(folder), "--realizations", "1", "--periods", "1", *settings]
     run = start("fjr_cli", "run", *options)
-    log = folder / "log" / "simulator.log"
-    peer.spin_until(lambda: log.exists() and "realization 0" in log.read_text(), "the first sample")
     hasty = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
+    early = peer.listen(JointState, "motor_position", hasty)
+    peer.spin_until(lambda: early and stamp_ns(early[-1]) > 1_000_000, "samples after the first")
     heard = [
         peer.listen(JointState, topic, hasty)
         for topic in ("reference", "motor_position", "motor_torque")
@@ -238,5 +239,5 @@ def test_a_late_foreign_recorder_does_not_disturb_and_gets_the_description(
     what = Campaign.create(folder / "campaign.yaml")
     assert Experiment.from_json(description[0].data, "topic") == what.experiment(0, 0)
     assert contents(folder) == contents(in_batch(what, tmp_path / "batch"))
-    assert heard[1][0].header.stamp.sec * 10**9 + heard[1][0].header.stamp.nanosec > 1_000_000
+    assert stamp_ns(heard[1][0]) > 1_000_000
     assert not never

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from bag_tools import MS, STORE, Stream, experiment, foreign_bag, rig_streams, write_bag
+from by_hand import stamp_ns
 from processes import Started, Starter, marked_processes
 from ros_domain import Peer
 from rosbags.interfaces import QosHistory, QosReliability, QosTime
@@ -20,10 +20,6 @@ from fjr_interface.topics import SIGNALS
 
 DESCRIBED = experiment(samples_per_period=1000)
 SAMPLES = DESCRIBED.samples
-
-
-def stamp_ns(message: Any) -> int:
-    return message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec
 
 
 class Ears:
