@@ -112,7 +112,7 @@ def _gain(motion: np.ndarray, torque: np.ndarray) -> float:
 
 
 def _continuous(joint: Joint, gains: dict[str, float]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return A, B, C with the states th, th' of the motor, then link, third body, drive."""
+    """Return A, B, C with the states th, th' of the motor, then link, third body, cable, drive."""
     body = joint.body
     inertias, dampings = [body["jm"]], [body["fvm"] + gains.get("motor_nm_s_rad", 0.0)]
     springs: list[tuple[int, int, float, float]] = []  # from body, to body, stiffness, damping
@@ -129,7 +129,9 @@ def _continuous(joint: Joint, gains: dict[str, float]) -> tuple[np.ndarray, np.n
         springs.append((1, 2, inertia * w**2, 2.0 * mode["damping_ratio"] * inertia * w))
     lag = joint.of("actuator_lag")["time_constant_s"]
     bodies = len(inertias)
-    size = 2 * bodies + bool(lag)
+    cable = joint.of("cable")
+    given_way = 2 * bodies
+    size = given_way + joint.has("cable") + bool(lag)
     stiff, damp = np.zeros((bodies, bodies)), np.diag(np.array(dampings))
     for first, second, k, damping in springs:
         signs = np.zeros((bodies, 1))
@@ -138,12 +140,16 @@ def _continuous(joint: Joint, gains: dict[str, float]) -> tuple[np.ndarray, np.n
     weight = joint.of("gravity")
     at = 0 if joint.one_body else 1
     stiff[at, at] += weight["torque_nm"] * math.cos(weight["angle_rad"])
-    stiff[at, at] += joint.of("external_spring")["stiffness_nm_rad"]
+    stiff[at, at] += joint.of("external_spring")["stiffness_nm_rad"] + cable["stiffness_nm_rad"]
     a, b, c = np.zeros((size, size)), np.zeros((size, 1)), np.zeros((2, size))
     inverse = np.diag(1.0 / np.array(inertias))
     a[0 : 2 * bodies : 2, 1 : 2 * bodies : 2] = np.eye(bodies)
     a[1 : 2 * bodies : 2, 0 : 2 * bodies : 2] = -inverse @ stiff
     a[1 : 2 * bodies : 2, 1 : 2 * bodies : 2] = -inverse @ damp
+    if joint.has("cable"):
+        a[2 * at + 1, given_way] = cable["stiffness_nm_rad"] / inertias[at]
+        a[given_way, 2 * at] = 1.0 / cable["relaxation_s"]
+        a[given_way, given_way] = -1.0 / cable["relaxation_s"]
     gain = 1.0 + joint.of("torque_gain")["relative_error"]
     if lag:
         a[1, -1], a[-1, -1], b[-1, 0] = 1.0 / inertias[0], -1.0 / lag, gain / lag

@@ -174,12 +174,12 @@ def _motor(joint: Joint, made: Laws) -> None:
     )
     on_motor = "drive + te*lever - friction" if not joint.one_body else "drive - friction + load"
     if joint.one_body:
-        on_motor += _outside(joint, "th")
+        on_motor += _outside(joint, "th", made)
     made.states = {"th": "w", "w": f"({on_motor})/jm", **made.states}
 
 
-def _outside(joint: Joint, angle: str) -> str:
-    """Return the torque of gravity and of a spring to the frame at an angle, with its sign."""
+def _outside(joint: Joint, angle: str, made: Laws) -> str:
+    """Return the torque of gravity, of a spring and a cable to the frame at an angle, signed."""
     torque = ""
     if joint.has("gravity"):
         weight = joint.of("gravity")
@@ -187,6 +187,10 @@ def _outside(joint: Joint, angle: str) -> str:
     if joint.has("external_spring"):
         spring = joint.of("external_spring")
         torque += f" - {spring['stiffness_nm_rad']!r}*({angle} - {spring['rest_rad']!r})"
+    if joint.has("cable"):
+        cable = joint.of("cable")
+        torque += f" - {cable['stiffness_nm_rad']!r}*({angle} - slack)"
+        made.states["slack"] = f"({angle} - slack)/{cable['relaxation_s']!r}"
     return torque
 
 
@@ -198,7 +202,7 @@ def _link(joint: Joint, made: Laws) -> None:
     square = joint.of("quadratic_friction")["link_nm_s2_rad2"]
     if square:
         torque += f" - {square!r}*abs(v)*v"
-    torque += _outside(joint, "q")
+    torque += _outside(joint, "q", made)
     if joint.has("extra_mode"):
         mode = joint.of("extra_mode")
         rate = 2.0 * math.pi * mode["frequency_hz"]

@@ -84,6 +84,7 @@ MJCF: Mapping[str, Treatment] = {
     "extra_mode": _native("a third body behind a tendon"),
     "gravity": _native("a torque that is sinusoidal in the angle of the link"),
     "external_spring": _native("stiffness and springref of the link's joint"),
+    "cable": _refused("springs there do not give way with time"),
     "transmission_stiffness": _native("a tendon between two bodies"),
     "torque_bias": _native("a constant torque"),
     "cogging": _native("cogging of a passive DC motor"),
@@ -126,6 +127,7 @@ URDF: Mapping[str, Treatment] = {
     "extra_mode": _refused("the joint moves one body"),
     "gravity": _refused("the mass and its place are not known, only their product"),
     "external_spring": _refused("a joint there has no spring"),
+    "cable": _refused("a joint there has no spring"),
     **dict.fromkeys(
         (
             *("torque_bias", "cogging", "delay", "actuator_lag", "torque_speed_limit"),
@@ -155,6 +157,7 @@ CONTROL: Mapping[str, Treatment] = {
     "torque_gain": _native("gain of the input"),
     "gravity": _equivalent("its slope at angle zero"),
     "external_spring": _equivalent("its stiffness; what it pulls at angle zero is left out"),
+    "cable": _native("a state"),
     "nonstationary": _refused("the model does not change with time"),
     **dict.fromkeys(
         (
@@ -182,7 +185,7 @@ SIMSCAPE: Mapping[str, Treatment] = {
             *("viscous_friction", "quadratic_friction", "presliding_friction", "backlash"),
             *("piecewise_stiffness", "asymmetric_stiffness", "cubic_stiffness", "hysteresis"),
             *("transmission_damping", "kinematic_error", "extra_mode", "gravity"),
-            *("external_spring", "transmission_stiffness", "torque_bias", "cogging"),
+            *("external_spring", "cable", "transmission_stiffness", "torque_bias", "cogging"),
             *("actuator_lag", "torque_speed_limit", "dead_band", "torque_constant_ripple"),
             *("torque_gain", "encoder_eccentricity"),
         ),

@@ -60,6 +60,7 @@ MODERATE = {
     "extra_mode": {"inertia_kg_m2": 0.03, "frequency_hz": 30.0, "damping_ratio": 0.02},
     "gravity": {"torque_nm": 3.0, "angle_rad": 0.5},
     "external_spring": {"stiffness_nm_rad": 40.0, "rest_rad": 0.05},
+    "cable": {"stiffness_nm_rad": 40.0, "relaxation_s": 0.2},
     "transmission_stiffness": {
         "compliance_rad_nm": 1e-3,
         "link_inertia_share": 0.6,
@@ -121,7 +122,7 @@ class Rig:
         plant: bare parameters that differ from the paper's.
         effects: effect parameters by full name.
         x: state: q, vq, th, vth, q3, v3, lagged torque, presliding torque of link and motor,
-            hysteresis.
+            hysteresis, angle at which a cable pulls nowhere.
     """
 
     plant: dict[str, float] = field(default_factory=dict)
@@ -138,17 +139,17 @@ class Rig:
     def start(self, q=0.0, vq=0.0, th=0.0, vth=0.0) -> Rig:
         """Set the motion of the two bodies."""
         self.x[:4] = q, vq, th, vth
-        self.x[4] = q
+        self.x[4] = self.x[10] = q
         return self
 
     def hold(self, torque: float, duration: float = 1e-3, parts: int = 1) -> np.ndarray:
         """Hold a torque; return a copy of q, vq, th, vth, ... after it."""
         for _ in range(parts):
             rig.hold(self.x, torque, duration / parts, self.p, self.e)
-        return self.x[:10].copy()
+        return self.x[:11].copy()
 
     def play(self, torque, duration: float = 1e-3, parts: int = 1) -> np.ndarray:
-        """Hold one torque after the other; return the states, shape (torques, 10)."""
+        """Hold one torque after the other; return the states, shape (torques, 11)."""
         return np.array([self.hold(float(u), duration, parts) for u in torque])
 
     def energy(self) -> float:
@@ -156,7 +157,7 @@ class Rig:
         v = self.values
         e = effects.DEFAULTS if self.e is None else self.e
         get = dict(zip(effects.NAMES, e, strict=False)).__getitem__
-        q, vq, th, vth, q3, v3, _, link, motor, flex = self.x[:10]
+        q, vq, th, vth, q3, v3, _, link, motor, flex, slack = self.x[:11]
         if self.one_body:
             q, vq, v = th, vth, {**v, "k0": 0.0, "k1": 0.0}
         rate = 2.0 * math.pi * get("extra_mode.frequency_hz")
@@ -174,6 +175,7 @@ class Rig:
             + 0.5
             * get("external_spring.stiffness_nm_rad")
             * (q - get("external_spring.rest_rad")) ** 2
+            + 0.5 * get("cable.stiffness_nm_rad") * (q - slack) ** 2
             + ripple / cycles * math.cos(angle)
             + ripple
             * get("cogging.second_ratio")

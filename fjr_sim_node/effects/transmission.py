@@ -138,7 +138,7 @@ TRANSMISSION: tuple[Effect, ...] = (
     ),
     Effect(
         "external_spring",
-        "A balancer, a hose or a cable pulls the link back as a spring to the frame does.",
+        "A balancer or a hose pulls the link back as a spring to the frame does.",
         "link",
         "plant.torques:link_drive",
         "slow motion stiffer at every amplitude",
@@ -154,6 +154,21 @@ TRANSMISSION: tuple[Effect, ...] = (
         ),
         looks_like="constant torque",
         rarer_than="gravity",
+        axis="both",
+    ),
+    Effect(
+        "cable",
+        "A cable to the frame pulls the link back, and gives way while it does.",
+        "link",
+        "plant.torques:cable_pull",
+        "quick motion stiffer at every amplitude, slow motion and DC as without",
+        "Maxwell element to the ground, a spring behind a damper",
+        (
+            size("stiffness_nm_rad", "N m/rad", "Stiffness against quick motion", 0.0, 1e9),
+            EffectParameter("relaxation_s", 1.0, "s", "Time in which its pull falls to 1/e",
+                            1e-4, 1e4, fit=(0.05, 50.0)),
+        ),
+        ({"stiffness_nm_rad": (0.01, 0.1), "relaxation_s": (0.5, 5.0)},),
         axis="both",
     ),
     Effect(

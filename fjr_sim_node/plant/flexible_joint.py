@@ -148,7 +148,7 @@ def _advance(s, torque, w, duration, p, e):
         steps = fastest_rate(twist, s, torque, rated, e) * duration / _PHASE_PER_STEP
     if not (steps < _MAX_SUBSTEPS and math.isfinite(torque)):
         nan = math.nan
-        return (nan, nan, nan, nan, nan, nan, nan), w
+        return (nan, nan, nan, nan, nan, nan, nan, nan), w
     substeps = int(steps) + 1
     h = duration / substeps
     m = (0.0, 0.0, 1.0, 0.0)
@@ -167,12 +167,12 @@ def _advance(s, torque, w, duration, p, e):
 
 @jit
 def _rate(speed, torque, p):
-    return fastest_rate(0.0, (0.0, 0.0, 0.0, speed, 0.0, 0.0, 0.0), torque, p, None)
+    return fastest_rate(0.0, (0.0, 0.0, 0.0, speed, 0.0, 0.0, 0.0, 0.0), torque, p, None)
 
 
 @jit
 def _rate_with_effects(speed, torque, p, e):
-    s = (0.0, 0.0, 0.0, speed, 0.0, 0.0, 0.0)
+    s = (0.0, 0.0, 0.0, speed, 0.0, 0.0, 0.0, 0.0)
     return fastest_rate(0.0, s, torque, with_bristles(p, 1.0, e), e)
 
 
@@ -208,7 +208,7 @@ def advance(q, vq, th, vth, torque, duration, p):
         (q, vq, th, vth) after the duration; all NaN if the torque is not finite or the motion is
         too fast to follow (more than _MAX_SUBSTEPS steps).
     """
-    s = (q, vq, th, vth, 0.0, 0.0, 0.0)
+    s = (q, vq, th, vth, 0.0, 0.0, 0.0, 0.0)
     w = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     s = _advance(s, torque, w, duration, p, None)[0]
     return s[0], s[1], s[2], s[3]
@@ -219,18 +219,20 @@ def advance_with_effects(x, torque, duration, p, e, friction=1.0):
     """Advance the plant with effects in place.
 
     Args:
-        x: float64 of shape (>= 10,): q, vq, th, vth, q3, v3, lagged torque, presliding torque of
-            link and motor (N m), and the state of the hysteresis in [-1, 1].
+        x: float64 of shape (>= 11,): q, vq, th, vth, q3, v3, lagged torque, presliding torque of
+            link and motor (N m), the state of the hysteresis in [-1, 1], and the angle at which a
+            cable pulls nowhere.
         torque: motor torque after the drive (N m).
         duration: time to advance (s).
         p: parameters from `coefficients`.
         e: parameters from `effects.coefficients`.
         friction: by what Coulomb and viscous friction have drifted, a factor.
     """
-    s = (x[0], x[1], x[2], x[3], x[4], x[5], x[6])
+    s = (x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[10])
     w = (x[7], x[8], x[9], x[0], x[2], deflection(x[0], x[2], e), 0.0, 0.0)
     s, w = _advance(s, torque, w, duration, with_bristles(p, friction, e), e)
     for i in range(7):
         x[i] = s[i]
+    x[10] = s[7]
     for i in range(3):
         x[7 + i] = w[i]

@@ -1,7 +1,8 @@
 """Smooth motion of the plant between events: torques on each side, one Runge-Kutta step.
 
 In this module, in `stick_slip` and in `plant`
-    s = (q, vq, th, vth, q3, v3, lagged torque), the last three at rest without effects;
+    s = (q, vq, th, vth, q3, v3, lagged torque, angle at which a cable pulls nowhere), the last four
+        at rest without effects;
     m = (link, motor, flex, region): slip directions, 0 while a side sticks, direction in which the
         deflection changes, smooth part of the spring that it is in;
     w = what has built up where the present motion began, and where that was: presliding torque of
@@ -17,7 +18,7 @@ import math
 from fjr_kit.compiled import inlined, jit
 
 from .. import effects as fx
-from .places import FS, FSM, JM, LINK_BRISTLES, MOTOR_BRISTLES, J
+from .places import FS, FSM, JM, LINK_BRISTLES, MOTOR_BRISTLES, J, is_rigid
 from .presliding import bristle_damping, bristle_torque
 from .spring import build_up, deflection, transmitted_torque
 from .torques import (
@@ -79,18 +80,18 @@ def motor_friction(s, te, m, w, p, e):
 def link_torque(s, te, p, e):
     """Return the torque that drives the link against its Coulomb friction."""
     if e is None:
-        return link_drive(s[0], s[1], te, 0.0, 0.0, p, e)
-    return link_drive(s[0], s[1], te, s[4], s[5], p, e)
+        return link_drive(s[0], s[1], te, 0.0, 0.0, 0.0, p, e)
+    return link_drive(s[0], s[1], te, s[4], s[5], s[7], p, e)
 
 
 @inlined
 def motor_torque(s, te, torque, p, e):
     """Return the torque that drives the motor against its Coulomb friction."""
     if e is None:
-        return motor_drive(s[2], s[3], te, torque, p, e)
+        return motor_drive(s[2], s[3], te, torque, 0.0, p, e)
     if e[fx.ACTUATOR_LAG_TIME_CONSTANT_S] != 0.0:
         torque = s[6]
-    return motor_drive(s[2], s[3], te, torque, p, e)
+    return motor_drive(s[2], s[3], te, torque, s[7], p, e)
 
 
 @inlined
@@ -106,9 +107,9 @@ def derivative(s, torque, m, w, p, e):
         friction = motor_viscous(s[3], p, e) + motor_friction(s, te, m, w, p, e)
         ath = (motor_torque(s, te, torque, p, e) - friction) / p[JM]
     if e is None:
-        return s[1], aq, s[3], ath, 0.0, 0.0, 0.0
+        return s[1], aq, s[3], ath, 0.0, 0.0, 0.0, 0.0
     if e[fx.TRANSMISSION_ON] == 0.0 and e[fx.DRIVE_ON] == 0.0:
-        return s[1], aq, s[3], ath, 0.0, 0.0, 0.0
+        return s[1], aq, s[3], ath, 0.0, 0.0, 0.0, 0.0
     a3 = 0.0
     if e[fx.EXTRA_MODE_INERTIA_KG_M2] != 0.0:
         rate = 2.0 * math.pi * e[fx.EXTRA_MODE_FREQUENCY_HZ]
@@ -118,7 +119,10 @@ def derivative(s, torque, m, w, p, e):
     lag = 0.0
     if e[fx.ACTUATOR_LAG_TIME_CONSTANT_S] != 0.0:
         lag = (torque - s[6]) / e[fx.ACTUATOR_LAG_TIME_CONSTANT_S]
-    return s[1], aq, s[3], ath, s[5], a3, lag
+    slack = 0.0
+    if e[fx.CABLE_STIFFNESS_NM_RAD] != 0.0:
+        slack = ((s[2] if is_rigid(p) else s[0]) - s[7]) / e[fx.CABLE_RELAXATION_S]
+    return s[1], aq, s[3], ath, s[5], a3, lag, slack
 
 
 @inlined
@@ -133,6 +137,7 @@ def moved(s, h, d, e):
             0.0,
             0.0,
             0.0,
+            0.0,
         )
     return (
         s[0] + h * d[0],
@@ -142,6 +147,7 @@ def moved(s, h, d, e):
         s[4] + h * d[4],
         s[5] + h * d[5],
         s[6] + h * d[6],
+        s[7] + h * d[7],
     )
 
 

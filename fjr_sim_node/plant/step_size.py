@@ -14,6 +14,7 @@ from .motion import link_torque, motor_torque
 from .places import FS, FV, FVM, JM, K0, K1, LINK_BRISTLES, MOTOR_BRISTLES, J, is_rigid
 from .spring import deflection, deflection_speed, transmitted_torque
 from .torques import (
+    cable_pull,
     link_level,
     link_viscous,
     load_coefficient,
@@ -40,8 +41,10 @@ def pushes(s, torque, w, p, e):
     stiffness, rest = e[fx.EXTERNAL_SPRING_STIFFNESS_NM_RAD], e[fx.EXTERNAL_SPRING_REST_RAD]
     if is_rigid(p):
         motor += e[fx.GRAVITY_TORQUE_NM] + stiffness * abs(s[2] - rest)
+        motor += abs(cable_pull(s[2], s[7], e))
     else:
         link += e[fx.GRAVITY_TORQUE_NM] + stiffness * abs(s[0] - rest)
+        link += abs(cable_pull(s[0], s[7], e))
     if p[LINK_BRISTLES] != 0.0:
         link += max(abs(w[0]), p[FS] + e[fx.STRIBECK_FRICTION_LINK_TORQUE_NM])
     if e[fx.EXTRA_MODE_INERTIA_KG_M2] != 0.0:
@@ -165,6 +168,7 @@ def _fastest_rate(stiffness, twist, decay, s, torque, p, e):
         mobility = 1.0 / p[J] + ratio * (ratio + load_coefficient(e)) / p[JM]
         decay += e[fx.TRANSMISSION_DAMPING_NM_S_RAD] * mobility
         outside = e[fx.GRAVITY_TORQUE_NM] + e[fx.EXTERNAL_SPRING_STIFFNESS_NM_RAD]
+        outside += e[fx.CABLE_STIFFNESS_NM_RAD]
         if is_rigid(p):
             motor += outside
         else:
@@ -185,6 +189,8 @@ def _fastest_rate(stiffness, twist, decay, s, torque, p, e):
         share = 1.0 + e[fx.EXTRA_MODE_INERTIA_KG_M2] / p[J]
         factor = max(math.sqrt(share), 2.0 * e[fx.EXTRA_MODE_DAMPING_RATIO] * share)
         rate = max(rate, 2.0 * math.pi * e[fx.EXTRA_MODE_FREQUENCY_HZ] * factor)
+    if e[fx.CABLE_STIFFNESS_NM_RAD] != 0.0:
+        rate = max(rate, 0.2 / e[fx.CABLE_RELAXATION_S])
     if e[fx.ACTUATOR_LAG_TIME_CONSTANT_S] != 0.0:
         rate = max(rate, 0.2 / e[fx.ACTUATOR_LAG_TIME_CONSTANT_S])
     return rate

@@ -207,7 +207,7 @@ def _stopped(s, link, motor):
     """Return s with the velocities of the sides that stop set to zero."""
     vq = 0.0 if link else s[1]
     vth = 0.0 if motor else s[3]
-    return s[0], vq, s[2], vth, s[4], s[5], s[6]
+    return s[0], vq, s[2], vth, s[4], s[5], s[6], s[7]
 
 
 @inlined

@@ -86,7 +86,13 @@ def motor_has_coulomb(p, e):
 
 
 @inlined
-def link_drive(q, vq, te, q3, v3, p, e):
+def cable_pull(angle, slack, e):
+    """Return the torque (N m) of a cable on its body at an angle; it pulls nowhere at `slack`."""
+    return e[fx.CABLE_STIFFNESS_NM_RAD] * (slack - angle)
+
+
+@inlined
+def link_drive(q, vq, te, q3, v3, slack, p, e):
     """Return the torque that drives the link against its friction (N m)."""
     if e is None or e[fx.TRANSMISSION_ON] == 0.0:
         return -te
@@ -95,6 +101,8 @@ def link_drive(q, vq, te, q3, v3, p, e):
         drive -= e[fx.GRAVITY_TORQUE_NM] * math.sin(q + e[fx.GRAVITY_ANGLE_RAD])
     if e[fx.EXTERNAL_SPRING_STIFFNESS_NM_RAD] != 0.0:
         drive -= e[fx.EXTERNAL_SPRING_STIFFNESS_NM_RAD] * (q - e[fx.EXTERNAL_SPRING_REST_RAD])
+    if e[fx.CABLE_STIFFNESS_NM_RAD] != 0.0:
+        drive += cable_pull(q, slack, e)
     if e[fx.EXTRA_MODE_INERTIA_KG_M2] != 0.0:
         rate = 2.0 * math.pi * e[fx.EXTRA_MODE_FREQUENCY_HZ]
         damping = 2.0 * e[fx.EXTRA_MODE_DAMPING_RATIO] * rate
@@ -142,7 +150,7 @@ def driven(th, vth, torque, e):
 
 
 @inlined
-def motor_drive(th, vth, te, torque, p, e):
+def motor_drive(th, vth, te, torque, slack, p, e):
     """Return the torque that drives the motor against its friction (N m)."""
     if e is None:
         return torque + te
@@ -156,6 +164,8 @@ def motor_drive(th, vth, te, torque, p, e):
         drive -= e[fx.GRAVITY_TORQUE_NM] * math.sin(th + e[fx.GRAVITY_ANGLE_RAD])
     if e[fx.EXTERNAL_SPRING_STIFFNESS_NM_RAD] != 0.0 and is_rigid(p):
         drive -= e[fx.EXTERNAL_SPRING_STIFFNESS_NM_RAD] * (th - e[fx.EXTERNAL_SPRING_REST_RAD])
+    if e[fx.CABLE_STIFFNESS_NM_RAD] != 0.0 and is_rigid(p):
+        drive += cable_pull(th, slack, e)
     return drive
 
 

@@ -22,8 +22,6 @@ from fjr_kit.errors import InputError
 
 from . import rig
 
-_BODIES = 6  # a rig's state begins with positions and velocities of link, motor and extra mass
-
 
 @dataclass(frozen=True)
 class State:
@@ -188,7 +186,7 @@ def simulate_law(
     """
     if begin is None:
         begin = State.at_rest(controller, elapsed_s)
-        begin.rig[:_BODIES] = start * (_BODIES // 2)
+        rig.move(begin.rig, *start)
         if controller_state is not None:
             begin.law[:-1] = _of_length(
                 controller_state, controller.states, "controller_state", "states"

@@ -17,8 +17,9 @@ from ..plant import advance, advance_with_effects
 LINK, MOTOR = 0, 2
 """Where link and motor position (rad) stand in a rig's state."""
 
+_BODIES = 3  # their positions and velocities come first: link, motor, third mass
 _EXTRA, _LAGGED = 4, 6
-_TIME, _SLEWED, _HEAD, _RING = 10, 11, 12, 13
+_SLACK, _TIME, _SLEWED, _HEAD, _RING = 10, 11, 12, 13, 14
 _RING_SIZE = 16_384  # samples of the longest delay: 100 ms at 20 kHz, each in eight parts
 _SLEW_PARTS = 8
 _AT_ONCE = 1e-3  # of a sample: a torque that slews no longer is held as a whole
@@ -35,17 +36,24 @@ def at_rest(elapsed_s: float = 0.0) -> np.ndarray:
     return state
 
 
+def move(state: np.ndarray, position: float, velocity: float) -> None:
+    """Set all bodies to one position (rad) and velocity (rad/s), a cable pulling nowhere there."""
+    state[: 2 * _BODIES] = (position, velocity) * _BODIES
+    state[_SLACK] = position
+
+
 def complete(state: np.ndarray, torque: float, elapsed_s: float) -> None:
     """Set what effects remember in a state that a rig without them has reached.
 
     Args:
-        state: of a rig in motion, changed in place: a third mass moves with the link, and lag,
-            slew limit and delay hold the torque.
+        state: of a rig in motion, changed in place: a third mass moves with the link, a
+            cable has given way, and lag, slew limit and delay hold the torque.
         torque: last command (N m).
         elapsed_s: time since the rig was switched on, for what drifts.
     """
     state[_TIME] = elapsed_s
     state[_EXTRA : _EXTRA + 2] = state[LINK : LINK + 2]
+    state[_SLACK] = state[MOTOR]
     state[_LAGGED] = state[_SLEWED] = torque
     state[_RING:] = torque
 

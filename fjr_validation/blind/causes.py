@@ -141,6 +141,12 @@ def _spring(rng: np.random.Generator, at: Scales) -> Draw:
                   {"spring_nm_rad": "stiffness_nm_rad", "spring_rest_rad": "rest_rad"})  # fmt: skip
 
 
+def _cable(rng: np.random.Generator, at: Scales) -> Draw:
+    return linear("cable", {"cable_nm_rad": at.torque / at.angle}, 0.05, 0.5,
+                  {"cable_time_s": log_uniform(rng, 0.05, 2.0)},
+                  {"cable_nm_rad": "stiffness_nm_rad", "cable_time_s": "relaxation_s"})  # fmt: skip
+
+
 def _delay(_: np.random.Generator, at: Scales) -> Draw:
     return linear("delay", {"delay_s": 1.0 / at.crossover_hz}, 2e-3, 0.06,
                   same_as={"delay_s": "time_s"})  # fmt: skip
@@ -224,6 +230,7 @@ _ANY_AXIS: tuple[Drawer, ...] = (
     _drag,
     _gravity,
     _spring,
+    _cable,
     _ripple("cogging", "cogging", "nm", 0.03, 0.5, lambda at: at.torque),
     _delay,
     _lag,
@@ -266,7 +273,7 @@ def drawers(*, rigid: bool, stationary: bool) -> tuple[Drawer, ...]:
 FAMILIES: tuple[frozenset[str], ...] = tuple(
     frozenset(names)
     for names in (
-        ("asymmetric_friction", "torque_bias", "gravity", "external_spring"),
+        ("asymmetric_friction", "torque_bias", "gravity", "external_spring", "cable"),
         ("backlash", "piecewise_stiffness", "asymmetric_stiffness", "cubic_stiffness"),
         ("delay", "actuator_lag", "torque_slew_limit"),
         ("position_friction", "cogging", "torque_constant_ripple", "kinematic_error"),

@@ -29,9 +29,8 @@ def _eddy(rng: np.random.Generator, at: Scales) -> Draw:
     return linear("eddy_drag", {"eddy_nm": at.torque}, 0.05, 0.5, shape)
 
 
-def _cable(rng: np.random.Generator, at: Scales) -> Draw:
-    shape = {"cable_time_s": log_uniform(rng, 0.05, 2.0)}
-    return linear("cable", {"cable_nm_rad": at.torque / at.angle}, 0.05, 0.5, shape)
+def _air_spring(_: np.random.Generator, at: Scales) -> Draw:
+    return linear("air_spring", {"air_spring_nm_rad3": at.torque / at.angle**3}, 0.02, 0.5)
 
 
 def _cushion(rng: np.random.Generator, at: Scales) -> Draw:
@@ -63,7 +62,7 @@ def _jitter(_: np.random.Generator, at: Scales) -> Draw:
 
 
 _ANY_AXIS: tuple[Drawer, ...] = (
-    _eyring, _eddy, _cable, _cushion, _heating, _interpolation, _wander, _jitter,
+    _eyring, _eddy, _air_spring, _cushion, _heating, _interpolation, _wander, _jitter,
 )  # fmt: skip
 
 

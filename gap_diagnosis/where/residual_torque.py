@@ -125,12 +125,12 @@ def _one(
         return np.fft.irfft(lines * window, samples * OVERSAMPLING) * OVERSAMPLING
 
     th, vth, ath = (fine(position * (1j * omega) ** order) for order in range(3))
-    q, vq, motor_torque, flex_state = _drive(th, rate * OVERSAMPLING, p, e)
+    q, vq, motor_torque, flex_state, slack = _drive(th, rate * OVERSAMPLING, p, e)
     if r.link is not None:
         link = np.fft.rfft(r.kept(r.link).mean(0))
         q, vq = fine(link), fine(link * 1j * omega)
     rest = max(REST * float(np.std(vth)), 3.0 * _rms(spread * omega * window))
-    states = np.array([th, vth, ath, q, vq, motor_torque, flex_state, fine(applied)])
+    states = np.array([th, vth, ath, q, vq, motor_torque, flex_state, slack, fine(applied)])
     missing = np.fft.rfft(_balance(states, rest, window, rate, p, e))[: omega.size]
     vth = states[1]
     every = slice(None, None, OVERSAMPLING)
@@ -210,15 +210,16 @@ def _applied(
 
 
 def _drive(th: np.ndarray, rate: float, p: tuple[float, ...], e):
-    """Return link position and velocity, presliding torque of the motor, state of hysteresis.
+    """Return link position and velocity, what has built up in the motor's friction and the gear.
 
-    All are (N,), the torque in N m. The compiled plant moves the link while a motor too heavy to be
-    moved follows th.
+    These are presliding torque of the motor and state of the hysteresis; the fifth is the angle at
+    which a cable pulls nowhere. All are (N,), the torque in N m. The compiled plant moves the link
+    while a motor too heavy to be moved follows th.
     """
     held = (_HELD, p[J], p[FS], p[FSM], p[FV], 0.0, p[K0], p[K1])
-    out = np.empty((4, th.size))
-    state = np.zeros(10)
-    state[0] = th[0]
+    out = np.empty((5, th.size))
+    state = np.zeros(11)
+    state[0] = state[10] = th[0]
     settle = 2
     for _ in range(settle):
         _follow(th, 1.0 / rate, held, e, state, out)
@@ -231,6 +232,7 @@ def _follow(th, step, p, e, x, out):
         ahead = th[(k + 1) % th.size]
         x[2], x[3] = th[k], (ahead - th[k]) / step
         out[0, k], out[1, k], out[2, k], out[3, k] = x[0], x[1], x[8], x[9]
+        out[4, k] = x[10]
         if e is None:
             x[0], x[1], x[2], x[3] = advance(x[0], x[1], x[2], x[3], 0.0, step, p)
         else:
@@ -263,11 +265,11 @@ def _balance(
 
 @jit
 def _missing_torque(states, rest, p, e, missing, friction):
-    """Fill in Jm th'' + friction - te - u, and the friction, for states (8, N) as in `_one`."""
+    """Fill in Jm th'' + friction - te - u, and the friction, for states (9, N) as in `_one`."""
     for k in range(missing.size):
-        th, vth, ath, q, vq, built, flex, u = states[:, k]
+        th, vth, ath, q, vq, built, flex, slack, u = states[:, k]
         te = transmitted_torque(q, vq, th, vth, flex, p, e)
-        balance = p[0] * ath + motor_viscous(vth, p, e) - motor_drive(th, vth, te, u, p, e)
+        balance = p[0] * ath + motor_viscous(vth, p, e) - motor_drive(th, vth, te, u, slack, p, e)
         if abs(vth) > rest:
             direction = 1.0 if vth > 0.0 else -1.0
             torque = direction * motor_level(abs(vth), direction, th, te, p, e)

@@ -111,7 +111,8 @@ class Scales:
                 "N m/s": self.peak_torque_nm / self.period_s,
                 "N m/rad": self.torque_nm / self.angle_rad,
             }[parameter.unit]
-        inner = fx.EFFECTS[name.split(".", 1)[0]].acts_on == "transmission"
+        part = fx.EFFECTS[name.split(".", 1)[0]].acts_on
+        inner = part == "transmission"
         drag = re.fullmatch(r"N m s(\d*)/rad\1", parameter.unit)
         if drag:
             return self.torque_nm / self.velocity_rad_s ** int(drag[1] or 1)
@@ -123,7 +124,7 @@ class Scales:
             "N m/rad3": self.torque_nm / self.deflection_rad**3,
             "rad/N m": self.angle_rad / self.torque_nm,
             "rad/s": self.velocity_rad_s,
-            "s": self.period_s,
+            "s": self.angle_rad / self.velocity_rad_s if part == "link" else self.period_s,
             "1/s": 1.0 / self.period_s,
             "Hz": self.band_hz,
             "kg m2": self.inertia_kg_m2,

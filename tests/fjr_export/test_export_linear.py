@@ -36,7 +36,7 @@ def test_the_script_moves_as_our_simulation_does(delay: float, lag: float, gain:
     # lags below 2e-5 s would take long here
     drive = {"delay.time_s": delay, "actuator_lag.time_constant_s": lag if lag > 2e-5 else 0.0}
     drive["torque_gain.relative_error"] = gain
-    joint = joint_of({**LINEAR, **drive, **moderate("extra_mode", "transmission_damping")})
+    joint = joint_of({**LINEAR, **drive, **moderate("extra_mode", "transmission_damping", "cable")})
     torque = np.sin(np.arange(300) ** 2 / 900.0)
     target = ControlJoint(control_script(joint, linear_joint(joint, [])))
     target.begin(0.0, 0.0)

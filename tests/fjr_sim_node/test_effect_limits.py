@@ -59,7 +59,7 @@ def odd_values(effect: effects.Effect) -> dict[str, float]:
 
 def test_every_effect_of_the_catalogue_is_tested_here():
     assert set(MODERATE) == set(IDENTIFIERS)
-    assert len(IDENTIFIERS) == 35
+    assert len(IDENTIFIERS) == 36
 
 
 @pytest.mark.parametrize("identifier", IDENTIFIERS)

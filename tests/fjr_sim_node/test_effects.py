@@ -374,8 +374,8 @@ def test_kinematic_error_follows_virtual_work():
     step = 1e-6
     for q, th in [(0.0, 0.0), (0.01, 0.05), (-0.02, 0.3)]:
         te = spring.transmitted_torque(q, 0.0, th, 0.0, 0.0, p, e)
-        on_link = torques.link_drive(q, 0.0, te, 0.0, 0.0, p, e)
-        on_motor = torques.motor_drive(th, 0.0, te, 0.0, p, e)
+        on_link = torques.link_drive(q, 0.0, te, 0.0, 0.0, 0.0, p, e)
+        on_motor = torques.motor_drive(th, 0.0, te, 0.0, 0.0, p, e)
         assert on_link == pytest.approx((energy(q - step, th) - energy(q + step, th)) / 2 / step,
                                         rel=1e-6)  # fmt: skip
         assert on_motor == pytest.approx((energy(q, th - step) - energy(q, th + step)) / 2 / step,
@@ -492,6 +492,42 @@ def test_a_spring_to_the_frame_is_gravity_of_small_travel():
         spring, weight, bare = (Rig(FRICTIONLESS | axis, e).play(torque)[:, 2] for e in on)
         assert 1e-3 < np.abs(spring).max() < 0.1
         assert np.abs(spring - weight).max() < 0.01 * np.abs(spring - bare).max()
+
+
+def test_a_cable_is_a_spring_behind_a_damper():
+    """The free body under it: a third-order linear system, solved by the matrix exponential."""
+    stiffness, relaxation = 7.0, 0.6
+    on = named("cable", stiffness_nm_rad=stiffness, relaxation_s=relaxation)
+    for axis, inertia, at in ((APART, J, 0), ({"k0": math.inf}, J + JM, 2)):
+        body = Rig({**axis, **FRICTIONLESS}, on).start(q=0.5, th=0.5)
+        body.x[at + 1] = 2.0
+        a = np.array(
+            [
+                [0.0, 1.0, 0.0],
+                [-stiffness / inertia, 0.0, stiffness / inertia],
+                [1.0 / relaxation, 0.0, -1.0 / relaxation],
+            ]
+        )
+        expected = expm(1.5 * a) @ [0.5, 2.0, 0.5]
+        found = body.hold(0.0, 1.5, parts=1500)[[at, at + 1, 10]]
+        np.testing.assert_allclose(found, expected, rtol=1e-7)
+
+
+def test_a_cable_that_hardly_gives_way_is_a_spring_and_one_that_does_at_once_a_damper():
+    torque = 20.0 * np.random.default_rng(5).standard_normal(300)
+    for axis in ({}, {"k0": math.inf}):
+        body = FRICTIONLESS | axis
+
+        def play(on, changed=body):
+            return Rig(changed, on).play(torque)[:, 2]
+
+        slow = play(named("cable", stiffness_nm_rad=40.0, relaxation_s=1e4))
+        spring = play(named("external_spring", stiffness_nm_rad=40.0, rest_rad=0.0))
+        np.testing.assert_allclose(slow, spring, atol=1e-4 * np.abs(spring).max())
+        quick = play(named("cable", stiffness_nm_rad=4e4, relaxation_s=1e-4))
+        damper = play({}, {**body, "fv": 4.0})
+        bare = play({})
+        assert np.abs(quick - damper).max() < 0.01 * np.abs(damper - bare).max()
 
 
 @pytest.mark.parametrize(("on", "bare"), [

@@ -159,7 +159,7 @@ def test_a_ripple_of_the_torque_constant_does_the_work_of_its_torque():
 
     for state in states[99::100]:
         assert 0.5 * JM * state[3] ** 2 == pytest.approx(quad(given, 0.0, state[2])[0], rel=1e-6)
-    assert np.array_equal(Rig(FREE_MOTOR, on).play(np.zeros(5)), np.zeros((5, 10)))
+    assert np.array_equal(Rig(FREE_MOTOR, on).play(np.zeros(5)), np.zeros((5, 11)))
 
 
 def test_an_asymmetric_stiffness_has_its_two_slopes():
