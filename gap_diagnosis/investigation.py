@@ -26,7 +26,7 @@ from .where.residual_torque import ResidualTorque, residual_torque
 from .which.attribution import Attribution
 from .which.catalogue import catalogue
 from .which.fits import Fitter
-from .which.rounding import widened, with_rounding
+from .which.rounding import smooth, widened, with_rounding
 from .which.search import Search
 from .which.search_space import TOLERANCE
 
@@ -123,16 +123,18 @@ def investigate(
         attribution = with_rounding(attribution, plain, step)
     progress("judgement")
     gates = with_bags_gate(gates, recorded, noise, simulator, attribution.best.model)
+    best = attribution.best
+    rounded = simulator.signals(best.model) if ROUNDING in best.effects else None
     models = {
         "nominal": model,
         "refit": attribution.refit.model,
-        "explained": attribution.best.model,
+        "explained": smooth(best.model) if len(best.effects) > 1 else best.model,
     }
     signals = {name: simulator.signals(each) for name, each in models.items()}
     maps = {name: residual_map(recorded, noise, *simulated) for name, simulated in signals.items()}
     diagnosis = judge(
         recorded, std, gates, fitter, attribution, signals, maps, held_out=held_out,
-        known_noise=noise is not None,
+        known_noise=noise is not None, rounded=rounded,
     )  # fmt: skip
     return Investigation(recorded, model, gates, noise, held, signals, maps, attribution, diagnosis)
 

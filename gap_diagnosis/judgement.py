@@ -37,6 +37,7 @@ def judge(
     *,
     held_out: bool,
     known_noise: bool,
+    rounded: Signals | None,
 ) -> Diagnosis:
     """Return the diagnosis of an experiment whose search has ended.
 
@@ -50,6 +51,7 @@ def judge(
         maps: residual map of each stage.
         held_out: whether the data that the fits are judged by are such that no fit has seen.
         known_noise: whether the noise was seen between periods.
+        rounded: simulated with the rounding of the encoder where that is named; None elsewhere.
     """
     best, refit = attribution.best, attribution.refit
     held, size = fitter.held.which, fitter.held.size
@@ -62,15 +64,17 @@ def judge(
     named = list(best.effects) if verdict in ("effect", "ambiguous") else []
     shown = best if named or verdict == "parameters_only" else refit
     groups = fitter.train.groups()
-    rounded = ROUNDING in best.effects
-    closes = bool(best.effects) and not rounded
+    closes = bool(set(best.effects) - {ROUNDING})
     gaps, figures = held_out_gap(recorded, held, signals, misfits, closes)
     said = notes(
         gates, attribution, verdict, held_size=size, held_out=held_out, nominal=fitter.nominal,
         tolerance=fitter.tolerance,
     )  # fmt: skip
-    if rounded:
-        said.append(_rounding(recorded, held, best, signals, misfits, figures.position.refit))
+    if rounded is not None:
+        before = "explained" if closes else "refit"
+        left = figures.position.explained if closes else figures.position.refit
+        by = attribution.by_noise_alone or 0.0, misfits["explained"]
+        said.append(_rounding(recorded, held, best, (signals[before], rounded), by, left))
     closed, bags = figures.position.closed, gates.gates[-1].bags
     moved = moved_by_scatter(shown, fitter.train.runs(), relative_scatter(bags))
     return _sure(
@@ -139,20 +143,20 @@ def _rounding(
     recorded: RecordedExperiment,
     held: tuple[int, ...],
     best: Fit,
-    signals: Mapping[str, Signals],
-    misfits: Mapping[str, float],
+    simulated: tuple[Signals, Signals],
+    misfits: tuple[float, float],
     left: Figure | None,
 ) -> str:
-    """Return the note on a coarse encoder: what the refit leaves beside what rounding makes."""
+    """Return the note on a coarse encoder: what all else leaves beside what rounding makes."""
     changes = [
-        np.mean((signals["explained"][0][i] - signals["refit"][0][i]) ** 2)
+        np.mean((simulated[1][0][i] - simulated[0][0][i]) ** 2)
         / np.mean(recorded.realizations[i].kept(recorded.realizations[i].position).mean(0) ** 2)
         for i in held
     ]
     step = best.model.effects[f"{ROUNDING}.resolution_rad"]
     made = float(np.sqrt(np.mean(changes)))
-    beside = misfits["refit"], misfits["explained"]
-    return rounding(step, 0.0 if left is None else left.value, made, beside)
+    beside = [effect for effect in best.effects if effect != ROUNDING]
+    return rounding(step, 0.0 if left is None else left.value, made, misfits, beside)
 
 
 def _equivalents(attribution: Attribution) -> list[list[str]]:

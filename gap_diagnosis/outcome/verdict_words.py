@@ -163,7 +163,7 @@ def closed(diagnosis: Diagnosis) -> str:
         why = (
             "rounding acts like noise in a loop, so that a simulation meets it in size but not "
             "sample by sample; see the note on its statistics"
-            if ROUNDING in diagnosis.effects
+            if diagnosis.effects == [ROUNDING]
             else "by the rms error of the position the refit leaves nothing beyond noise, or the "
             "explanation brings the simulation no nearer to the rig"
         )

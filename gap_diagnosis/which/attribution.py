@@ -48,6 +48,8 @@ class Attribution:
         tied: explanations that the data can't tell from the best, without it.
         explained: whether the best leaves nothing worth explaining.
         complete: whether the search ended by itself, not by its time budget.
+        by_noise_alone: held-out misfit per degree of freedom of the best by noise without rounding,
+            where a coarse encoder is named; else None.
     """
 
     refit: Fit
@@ -56,6 +58,7 @@ class Attribution:
     tied: tuple[Fit, ...]
     explained: bool
     complete: bool = True
+    by_noise_alone: float | None = None
 
 
 def stands_out(left: float, refit: float, rival: float) -> float:

@@ -55,6 +55,18 @@ class Ranking:
         """Return which of some fits, best first, leave less than `times` what the first does."""
         return [fit for fit in ranked if self.misfit(fit) < times * self.misfit(ranked[0])]
 
+    @staticmethod
+    def unlike(ranked: Sequence[Fit]) -> list[Fit]:
+        """Return fits of one effect without those whose effect is much like one that stands before.
+
+        What is much like another effect goes with the same further causes.
+        """
+        kept: list[Fit] = []
+        for fit in ranked:
+            if not any(stands_for(fit.effects, other.effects) for other in kept):
+                kept.append(fit)
+        return kept
+
     def sure(self, count: int) -> list[Fit]:
         """Return the converged fits of `count` effects none of which could be zero, best first."""
         for effects, fit in self.fits.items():

@@ -3,7 +3,8 @@
 All recorded positions are then multiples of one step, which no fit has to find. In the loop the
 rounding decides chaotically which count comes next: it repeats with the periods, so that their
 scatter does not show it, but no simulation meets it sample by sample. So it widens the variance of
-the lines, step^2/12 a sample, and is named where the refit leaves nothing but that.
+the lines, step^2/12 a sample, and is named where the refit, or the effects beside it, leave nothing
+but that.
 """
 
 from __future__ import annotations
@@ -13,8 +14,9 @@ from dataclasses import replace
 import numpy as np
 
 from ..model.misfit import Misfit
+from ..model.simulated_rig import Model
 from ..outcome.verdict_words import ROUNDING
-from .attribution import CERTAIN, SMALL_GAIN, Attribution
+from .attribution import CERTAIN, PLAIN, SECOND_GAIN, SMALL_GAIN, Attribution
 from .fits import Fit
 
 
@@ -30,38 +32,55 @@ def widened(noise_std: np.ndarray, step: float, samples: int) -> np.ndarray:
 def with_rounding(
     attribution: Attribution, plain: tuple[Misfit, Misfit], step: float
 ) -> Attribution:
-    """Return an attribution that names the rounding, if it is what the refit leaves.
+    """Return an attribution that names the rounding, if its best explanation leaves that alone.
 
     Args:
         attribution: from misfits whose variance is widened by the rounding.
         plain: misfits of the training and of the held-out data whose variance is not.
         step: of the encoder, rad.
     """
-    refit = attribution.refit
-    if attribution.best.effects or not attribution.explained:
+    best = attribution.best
+    if not attribution.explained or best.held_chi2 > PLAIN * plain[1].size:
         return attribution
-    train, held = (misfit.chi2(refit.model) * misfit.size for misfit in plain)
-    more = held - refit.held_chi2
-    if more < CERTAIN or held < SMALL_GAIN * refit.held_chi2:
+
+    def costs(fit: Fit) -> tuple[float, float]:
+        train, held = (misfit.chi2(fit.model) * misfit.size for misfit in plain)
+        return train, held
+
+    held = costs(best)[1]
+    gain = SECOND_GAIN if best.effects else SMALL_GAIN
+    if held - best.held_chi2 < CERTAIN or held < gain * best.held_chi2:
         return attribution
-    found = _rounded(refit, step)
-    others = [replace(f, held_chi2=f.held_chi2 + more) for f in attribution.candidates]
-    rest = [fit for fit in others if fit.effects != (ROUNDING,)]
+    found = _rounded(best, step)
+    tied = tuple(_rounded(fit, step) for fit in attribution.tied)
+    more = held - best.held_chi2
+    others = [
+        replace(f, held_chi2=f.held_chi2 + more)
+        for f in attribution.candidates
+        if ROUNDING not in f.effects
+    ]
+    train, held = costs(attribution.refit)
     return Attribution(
-        replace(refit, train_chi2=train, held_chi2=held), (found, *rest), found, (), True,
-        attribution.complete,
+        replace(attribution.refit, train_chi2=train, held_chi2=held), (found, *tied, *others),
+        found, tied, True, attribution.complete, (more + best.held_chi2) / plain[1].size,
     )  # fmt: skip
 
 
-def _rounded(refit: Fit, step: float) -> Fit:
-    """Return the refit with the encoder's step, which is known and not fitted."""
+def smooth(model: Model) -> Model:
+    """Return a model whose encoder does not round."""
+    left = {name: value for name, value in model.effects.items() if not name.startswith(ROUNDING)}
+    return replace(model, effects=left)
+
+
+def _rounded(fit: Fit, step: float) -> Fit:
+    """Return a fit with the encoder's step, which is known and not fitted."""
     name = f"{ROUNDING}.resolution_rad"
-    space, solution = refit.space, refit.solution
+    space, solution = fit.space, fit.solution
     return replace(
-        refit,
-        effects=(ROUNDING,),
-        model=refit.model.with_effects({name: step}),
-        space=replace(space, effects=(name,), units=(step,)),
+        fit,
+        effects=tuple(sorted((*fit.effects, ROUNDING))),
+        model=fit.model.with_effects({name: step}),
+        space=replace(space, effects=(*space.effects, name), units=(*space.units, step)),
         solution=replace(
             solution,
             x=np.append(solution.x, 1.0),

@@ -190,7 +190,7 @@ class Search:
         """Search forward, backward and by swaps for a second effect; return how many to name."""
         if self._found.misfit(best) < _WORTH_A_PAIR or self._found.owed_to_its_form(best):
             return 1
-        for parent in self._found.ranked(1)[:2]:
+        for parent in self._found.unlike(self._found.ranked(1))[:2]:
             if self._found.misfit(parent) < _NEAR * self._found.misfit(best):
                 others = [e for e in self._fitter.catalogue if e not in parent.effects]
                 self._extend(parent, others, _PROMISING_SECONDS)
