@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -21,6 +22,7 @@ from .which.attribution import Attribution
 from .which.confidence import confidence
 from .which.estimates import estimates, moved_by_scatter, relative_scatter
 from .which.fits import Fit, Fitter
+from .which.ripples_passed import doubt_of_shape, ripples_passed
 
 NO_GAP = 2.0
 """Held-out misfit of the nominal model per degree of freedom below which there is no gap."""
@@ -77,6 +79,8 @@ def judge(
         said.append(_rounding(recorded, held, best, (signals[before], rounded), by, left))
     closed, bags = figures.position.closed, gates.gates[-1].bags
     moved = moved_by_scatter(shown, fitter.train.runs(), relative_scatter(bags))
+    passed = [ripples_passed(shown.model, effect, fitter.scales) for effect in named]
+    doubt = doubt_of_shape(min(passed, default=math.inf))
     return _sure(
         Diagnosis(
             verdict=verdict,
@@ -94,7 +98,8 @@ def judge(
             parameters=estimates(shown, groups, moved),
             next_experiment=_next(recorded, noise_std, attribution, verdict),
             notes=said,
-        )
+        ),
+        doubt,
     )
 
 
@@ -105,9 +110,14 @@ def stopped(verdict: Verdict, gates: GateReport) -> Diagnosis:
     return _sure(Diagnosis(verdict=verdict, confidence=0.0, gap=nothing, notes=said))
 
 
-def _sure(diagnosis: Diagnosis) -> Diagnosis:
-    """Return a diagnosis with its confidence and causes, which follow from its other fields."""
-    sure = diagnosis.model_copy(update={"confidence": confidence(diagnosis)})
+def _sure(diagnosis: Diagnosis, doubt: float = 1.0) -> Diagnosis:
+    """Return a diagnosis with its confidence and causes, which follow from its other fields.
+
+    Args:
+        diagnosis: without them.
+        doubt: factor of the confidence, see `doubt_of_shape`.
+    """
+    sure = diagnosis.model_copy(update={"confidence": doubt * confidence(diagnosis)})
     return sure.model_copy(update={"causes": causes(sure)})
 
 

@@ -33,6 +33,7 @@ from .which.presence import (
     invariance,
     where_it_acts,
 )
+from .which.ripples_passed import doubt_of_shape, ripples_passed
 from .which.stepwise import NOTHING_LEFT, Found
 
 PLAIN = 4.0
@@ -46,6 +47,8 @@ LEAST_IN_BAND = 0.8
 """Of what is left in its best band, what a cause must close if its share of all is not certain."""
 _UNCERTAIN = 0.5  # of what a cause whose size is not certain would be present
 _DOUBTED = 0.7  # over what remains: a cause that closes such a share is there as often as not
+_LITTLE = 0.2  # of the gap: a cause that closes less is there less often than its band says
+_IF_NOTHING = 0.75  # of what one that closes nothing of the whole gap would be present
 
 THIN = (
     "The records are too short or too few to hold anything out of the fits, so nothing is named: "
@@ -66,6 +69,7 @@ class Tested:
         bounded: whether a parameter lies where the fit may go no further.
         share: how much of what the refit left comes back without it, on unseen parts that select.
         in_band: how much of what is left without it, it closes where it gains most; see `closed`.
+        ripples: how many of its ripples the motion passes; infinite for what has none.
     """
 
     effect: str
@@ -76,6 +80,7 @@ class Tested:
     bounded: bool
     share: Figure
     in_band: float
+    ripples: float = math.inf
 
     @property
     def passed(self) -> bool:
@@ -107,12 +112,16 @@ class Tested:
         """Probability that it is there.
 
         A cause that closes little of the gap, and little even in the band where it gains most, may
-        be a part of what no effect explains.
+        be a part of what no effect explains. Of 24 causes of the blind checks 307 to 311 that
+        closed less than a fifth of the whole gap, 16 were right, stated at 0.80 in the mean.
         """
         sure = (1.0 - min(1.0, 5.0 * self.gain.p)) * min(1.0, self.gain.share + 0.1)
         of_all = self.share.low if self.share.low is not None and self.share.low > 0.0 else 0.0
         closed = max(self.in_band, of_all, 0.0)
         sure *= closed / (closed + _DOUBTED * (1.0 - closed))
+        of_gap = min(max(0.0, self.share.value) / _LITTLE, 1.0)
+        sure *= _IF_NOTHING + (1.0 - _IF_NOTHING) * of_gap
+        sure *= doubt_of_shape(self.ripples)
         if not self.certain or self.bounded:
             sure *= _UNCERTAIN
         if self.invariance_p is not None and self.invariance_p < LEAST_INVARIANCE_P:
@@ -146,6 +155,7 @@ def tested_causes(
                 at_its_bound(fit, effect),
                 ledger.share(without.model, fit.model, refit.model),
                 closed(fitter, fit, without),
+                ripples_passed(fit.model, effect, fitter.scales),
             )
         )
     return found
@@ -232,14 +242,13 @@ def _cause(
     alternatives: dict[str, list[str]],
     estimates: dict[str, Estimate],
 ) -> Cause:
-    best = found.best
     parameters = {n: e for n, e in estimates.items() if n.startswith(f"{tested.effect}.")}
-    moved = where_it_acts(fitter, best, tested.without, ledger.parts)
+    moved = where_it_acts(fitter, found.best, tested.without, ledger.parts)
     return Cause(
         effect=tested.effect,
         others=alternatives.get(tested.effect, []),
         present=tested.present,
-        share=ledger.share(tested.without.model, best.model, found.steps[0].model),
+        share=ledger.share(tested.without.model, found.best.model, found.steps[0].model),
         invariance_p=tested.invariance_p,
         where=ledger.places(moved),
         parameters=parameters,
@@ -276,7 +285,6 @@ def _ranking(fitter: CellFitter, found: Found) -> list[Candidate]:
     for count, fits in found.rivals.items():
         parent = found.steps[min(count, len(found.steps)) - 1]
         for fit in fits:
-            names = [n for n in fit.space.effects]
             ranked.append(
                 Candidate(
                     effects=list(fit.effects),
@@ -285,7 +293,7 @@ def _ranking(fitter: CellFitter, found: Found) -> list[Candidate]:
                     converged=fit.solution.converged,
                     parameters={
                         n: {"value": fit.model.effects[n], "low": math.nan, "high": math.nan}
-                        for n in names
+                        for n in fit.space.effects
                     },
                 )
             )

@@ -13,6 +13,7 @@ from fjr_sim_node import effects as fx
 from .cell_fits import CellFit, CellFitter
 from .fits import NO_PROMISE, RIPPLES_TRIED, Fit, Fitter
 from .reduced_fits import without
+from .ripples_passed import LEAST_PASSED, ripples_passed
 from .screening import Screening
 from .search_space import Space
 
@@ -34,7 +35,8 @@ def with_second_harmonics(fitter: Fitter, fit: Fit) -> Fit:
         for space, point, known in found:
             worth = _WORTH_A_HARMONIC * fit.train_chi2
             richer = fitter.solve(fit.effects, space, point, worth, known=known)
-            if richer.converged and richer.train_chi2 < worth:
+            better = richer.converged and richer.train_chi2 < worth
+            if better and ripples_passed(richer.model, effect, fitter.scales) >= LEAST_PASSED:
                 fit = richer
     return fit
 
@@ -49,7 +51,9 @@ def with_second_harmonic(fitter: CellFitter, fit: CellFit, ripple: str) -> CellF
     """
     proposals = fitter.screening_of(fit, _seeds(ripple)).proposals()
     found = fitter.add(fit, ripple, proposals, 1)
-    return None if found is None else replace(found, effects=fit.effects)
+    if found is None or ripples_passed(found.model, ripple, fitter.scales) < LEAST_PASSED:
+        return None
+    return replace(found, effects=fit.effects)
 
 
 def _seeds(effect: str) -> list[Mapping[str, float]]:

@@ -6,6 +6,7 @@ its unit and from the part that its effect acts on.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -36,6 +37,7 @@ class Scales:
         inertia_kg_m2: motor and link together.
         peak_torque_nm: greatest torque; a drive that saturates does so below it, and far below
             where the loop then asks for more.
+        travel_rad: greatest range of the motion within one run; infinite where nobody looked.
         corners: pairs of motor speed (rad/s) and greatest torque (N m) in its direction.
     """
 
@@ -47,6 +49,7 @@ class Scales:
     band_hz: float
     inertia_kg_m2: float
     peak_torque_nm: float
+    travel_rad: float = math.inf
     corners: tuple[tuple[float, float], ...] = ()
 
     @classmethod
@@ -79,6 +82,7 @@ class Scales:
             band_hz=band_hz,
             inertia_kg_m2=nominal["jm"] + nominal.get("j", 0.0),
             peak_torque_nm=max(float(np.abs(u).max()) for u in torques) or 1.0,
+            travel_rad=max(float(np.ptp(y)) for y in positions),
             corners=_corners(
                 np.concatenate(speeds),
                 np.concatenate(

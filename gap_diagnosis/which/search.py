@@ -233,13 +233,15 @@ class Search:
                 del self._found.fits[pair.effects]
 
     def _swap(self, best: Fit) -> None:
-        """Fit the best pair with each member replaced by what is near it or holds it."""
+        """Fit the best pair with each member replaced by what is near it, holds it or leads."""
         pairs = self._found.ranked(2)
         if not pairs or not self._found.calls_for(best, pairs[0], SECOND_GAIN):
             return
         for kept, swapped in (pairs[0].effects, pairs[0].effects[::-1]):
             alike = partners([swapped], set(self._fitter.catalogue) - {kept, swapped})
             alike += holders([swapped], self._fitter.catalogue)
+            leading = [fit.effects[0] for fit in self._found.unlike(self._found.ranked(1))[:_HELD]]
+            alike += [e for e in leading if e not in (kept, swapped, *alike)]
             if alike:
                 self._extend(without(self._fitter, pairs[0], swapped), alike, near=_ALIKE)
         self._drop_holders(2)

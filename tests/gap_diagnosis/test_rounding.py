@@ -14,6 +14,7 @@ from fjr_records.noise import noise_levels
 from fjr_records.periodic import RecordedExperiment
 from fjr_records.realization import unsettled
 from fjr_sim_node.plant import PLANT
+from gap_diagnosis.investigation import investigate
 from gap_diagnosis.model.misfit import Misfit
 from gap_diagnosis.model.simulated_rig import Model, Simulator
 from gap_diagnosis.outcome.verdict_words import ROUNDING
@@ -92,6 +93,21 @@ def test_the_coarse_encoder_is_named_and_the_refit_is_left_as_it_is(coarse):
     assert found.refit.held_chi2 > 1.25 * found.best.held_chi2
     assert found.best.model.effects == {f"{ROUNDING}.resolution_rad": STEP}
     assert found.best.model.plant == found.refit.model.plant
+
+
+def test_the_coarse_encoder_is_named_beside_another_cause():
+    late = {"delay.time_s": 1e-3, f"{ROUNDING}.resolution_rad": STEP}
+    case = simulate_case(late, seed=5, **SHORT)
+    recorded = case.recorded
+    nominal = Model.nominal(PLANT.defaults()).plant
+    few = ("delay", "actuator_lag", "torque_bias")
+    found = investigate(recorded, nominal, effects=[*few, ROUNDING]).diagnosis
+    assert found.effects == ["delay", ROUNDING] and found.verdict == "effect"
+    assert found.gap_closed == pytest.approx(1.0, abs=0.05)
+    said = next(note for note in found.notes if "judged by its statistics" in note)
+    assert "the refit with delay leaves" in said
+    alone = investigate(recorded, nominal, effects=few).diagnosis
+    assert alone.effects == ["delay"]
 
 
 def test_a_fine_encoder_is_not_named():
