@@ -20,7 +20,7 @@ _LINEAR_UNITS = {"reference": "m", "torque": "N", "position": "m", "link": "m"}
 
 def held_by(path: Path) -> Iterator[str]:
     """Yield the lines that say what a file holds, for those who must name its columns."""
-    columns = held_columns(path)
+    columns, more = held_columns(path)
     yield f"{path.name} holds"
     width = max((len(one.name) for one in columns), default=0)
     for one in columns:
@@ -29,6 +29,8 @@ def held_by(path: Path) -> Iterator[str]:
         if one.range is not None:
             values = f"from {one.range[0]:.6g} to {one.range[1]:.6g}"
         yield f"  {one.name:<{width}}  {shape:>10}  {values}"
+    if more:
+        yield f"  and {more} more, not shown"
     yield (
         "Nothing was written. Next: name the columns of torque and position, perhaps of reference "
         "and time: --dry-run --map torque=COLUMN:UNIT,position=COLUMN:UNIT,time=COLUMN:s"

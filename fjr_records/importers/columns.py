@@ -72,16 +72,18 @@ class Held:
     range: tuple[float, float] | None
 
 
-def held_columns(path: str | Path, most: int = 200) -> list[Held]:
-    """Return what a file holds, in its order; raise InputError if it cannot be read.
+def held_columns(path: str | Path, most: int = 200) -> tuple[list[Held], int]:
+    """Return what a file holds, in its order, and how much more there is beyond the most.
+
+    Raises InputError if the file cannot be read.
 
     Args:
         path: the file, as for `read_columns`.
         most: how many names are looked at.
     """
 
-    def held(found: Names) -> list[Held]:
-        return [_held(name, found) for name in found.known[:most]]
+    def held(found: Names) -> tuple[list[Held], int]:
+        return [_held(name, found) for name in found.known[:most]], len(found.known[most:])
 
     return _of_file(Path(path), held)
 

@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.io import savemat
 
+from fjr_cli.import_summary import held_by
 from fjr_kit.errors import InputError
 from fjr_records.importers.columns import READERS, held_columns, read_columns
 
@@ -63,7 +64,8 @@ def test_what_a_text_holds_can_be_read_by_the_names_that_are_listed(tmp_path, na
     text, _ = TEXTS[name]
     write = gzip.compress if name.endswith(".gz") else bytes
     (tmp_path / name).write_bytes(write(text.encode()))
-    held = held_columns(tmp_path / name)
+    held, more = held_columns(tmp_path / name)
+    assert more == 0
     read = read_columns(tmp_path / name, [one.name for one in held])
     assert len(held) == 3
     for one, column in zip(held, read.values(), strict=True):
@@ -74,9 +76,16 @@ def test_what_a_mat_file_holds_is_listed_whatever_it_is(tmp_path):
     bad = np.array([1.0, np.nan])
     content = {"rec": {"pos": np.array([R, Y]), "who": "me"}, "k": 3.0, "bad": bad}
     savemat(tmp_path / "run.mat", content)
-    held = {one.name: (one.shape, one.range) for one in held_columns(tmp_path / "run.mat")}
+    held = {one.name: (one.shape, one.range) for one in held_columns(tmp_path / "run.mat")[0]}
     assert held["rec.pos"] == ((2, 40), (min(R.min(), Y.min()), max(R.max(), Y.max())))
     assert held["bad"] == ((2,), None)
+
+
+def test_a_file_of_many_columns_says_how_many_are_not_shown(tmp_path):
+    np.savez(tmp_path / "run.npz", **{f"a{k:03d}": R for k in range(203)})
+    held, more = held_columns(tmp_path / "run.npz")
+    assert len(held) == 200 and more == 3
+    assert "  and 3 more, not shown" in list(held_by(tmp_path / "run.npz"))
 
 
 @pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "latin-1"])
