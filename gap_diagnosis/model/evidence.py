@@ -120,6 +120,14 @@ class Evidence:
         return tuple(i for i, part in enumerate(self.parts) if part.purpose in purposes)
 
     @property
+    def reported_on(self) -> Literal["records", "blocks", "none"]:
+        """What the reporting parts are: records that no fit has seen, or blocks of records."""
+        if not self.parts_for("report"):
+            return "none"
+        records = [{self.parts[i].record for i in self.parts_for(p)} for p in ("fit", "report")]
+        return "blocks" if records[0] & records[1] else "records"
+
+    @property
     def reporting(self) -> tuple[int, ...]:
         """The parts that all figures are computed on; the others where none reports."""
         return self.parts_for("report") or self.parts_for("select", "fit")

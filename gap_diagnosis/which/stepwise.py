@@ -141,7 +141,9 @@ class Stepwise:
             if fit is not None:
                 fits.append(fit)
         fits = self._ranked(fits, parent)
-        leading = [self._enriched(self._settled(fit)) for fit in fits[:_POLISHED]]
+        first = [fit.effects[-1] for fit in fits[:_POLISHED]]
+        near = len(partners(first[:1], set(first))) > 1
+        leading = [self._enriched(self._settled(f, parent, near)) for f in fits[:_POLISHED]]
         return self._ranked([*leading, *fits[_POLISHED:]], parent)
 
     def _worth_a_fit(
@@ -158,9 +160,20 @@ class Stepwise:
     def _ranked(self, fits: Sequence[CellFit], parent: CellFit) -> list[CellFit]:
         return sorted(fits, key=lambda fit: -self._gain(fit, parent).mean)
 
-    def _settled(self, fit: CellFit) -> CellFit:
-        """Return a fit that leads, taken further where its few steps have not reached its end."""
-        if fit.solution.converged:
+    def _settled(self, fit: CellFit, parent: CellFit, alike: bool) -> CellFit:
+        """Return a fit that leads, taken to its end.
+
+        A fit begins with the weights of what its parent leaves, so one that closes most of that
+        ends elsewhere by the weights of what itself leaves; which of two that are near equivalents
+        does better shows there alone.
+
+        Args:
+            fit: one that leads.
+            parent: the fit that it extends.
+            alike: whether it has a near equivalent that leads as well.
+        """
+        closes_little = left_of(self._fitter, fit, parent) > _OUTDATED
+        if fit.solution.converged and closes_little and not alike:
             return fit
         self._progress(f"{' + '.join(fit.effects)}, further")
         return self._fitter.further(fit)
@@ -175,7 +188,11 @@ class Stepwise:
             return fit
         self._progress(f"{' + '.join(fit.effects)}, second harmonic")
         richer = with_second_harmonic(self._fitter, fit, effect)
-        return fit if richer is None or not self._gain(richer, fit).present else richer
+        if richer is None or not self._gain(richer, fit).present:
+            return fit
+        # both by the weights of what they leave themselves
+        richer, alone = self._fitter.further(richer), self._fitter.further(fit)
+        return richer if self._gain(richer, alone).present else alone
 
     def _one_cause(self, parent: CellFit, refit: CellFit) -> list[str]:
         """Return what could only name a cause of the parent twice; see `ONE_CAUSE`."""
