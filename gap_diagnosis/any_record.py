@@ -19,6 +19,7 @@ from fjr_records.records import RecordSet, read_records, reference_optional
 from .drift_gate import drift_gate
 from .investigation import Investigation, investigate
 from .judgement import stopped
+from .model.nominal import datasheet
 from .notes import NOT_HELD_OUT
 from .outcome.diagnosis import Diagnosis
 from .record_investigation import RecordInvestigation, investigate_records
@@ -56,7 +57,8 @@ def diagnose(
     Args:
         folder: experiment folder of bags, periodic or not.
         nominal: datasheet values of the bare plant's parameters in SI units, by the names of
-            `fjr_sim_node.plant.PLANT`; `read_nominal` reads them from a parameter file.
+            `fjr_sim_node.plant.PLANT`; friction and k1 may be left out, j and k0 of a rigid axis.
+            `read_nominal` reads them from a parameter file.
         tolerance: how far a datasheet value may be off, relative.
         effects: identifiers to look for; None for all.
         budget_s: time after which nothing new is tried.
@@ -66,11 +68,12 @@ def diagnose(
         The diagnosis; `investigate_any` returns its evidence as well, for `write_diagnosis`.
 
     Raises:
-        InputError: damaged bags, bags of different rigs, a controller of an unknown kind, or an
-            effect of an unknown name.
+        InputError: damaged bags, bags of different rigs, a controller of an unknown kind, an effect
+            of an unknown name, or a parameter that is missing or out of range.
     """
+    sheet = datasheet(nominal, "nominal")
     return investigate_any(
-        read_any(folder), nominal, tolerance=tolerance, effects=effects, budget_s=budget_s,
+        read_any(folder), sheet, tolerance=tolerance, effects=effects, budget_s=budget_s,
         progress=progress,
     ).diagnosis  # fmt: skip
 

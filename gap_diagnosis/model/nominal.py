@@ -74,7 +74,20 @@ def read_nominal(source: str | Path) -> dict[str, float]:
         raise InputError(
             f"{source}: /rig/simulator is missing; write the datasheet's values below it."
         )
-    where = f"{source}: /rig/simulator"
+    return datasheet(given, f"{source}: /rig/simulator")
+
+
+def datasheet(given: Mapping[str, object], where: str) -> dict[str, float]:
+    """Return the nominal parameters of the bare plant from those that a datasheet gives.
+
+    Args:
+        given: by name, SI units; what may be left out is said at `read_nominal`.
+        where: what names their place in a sentence.
+
+    Raises:
+        InputError: an unknown name, an inertia or a stiffness that is missing, a value out of
+            range, or an effect that is switched on.
+    """
     if given.get("j") == 0.0 and given.get("k0", math.inf) == math.inf:
         given = {name: value for name, value in given.items() if name != "j"}
     checked = SIMULATOR.check(given, where)
