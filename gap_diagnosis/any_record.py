@@ -171,7 +171,8 @@ def _drifting(steady: Investigation, whole: RecordInvestigation) -> Investigatio
         return replace(steady, gates=gates)
     steadier = [g for g in gates.gates if g.passed or g.hint != "bad_data" or not g.of_periods]
     told = stopped("nonstationary", replace(gates, gates=tuple(steadier)))
-    return replace(steady, gates=gates, diagnosis=told)
+    seen = {name: getattr(whole.diagnosis, name) for name in ("gap", "steps", "evidence")}
+    return replace(steady, gates=gates, diagnosis=told.model_copy(update=seen))
 
 
 def _beside(whole: RecordInvestigation, steady: Investigation, why: str) -> RecordInvestigation:

@@ -97,6 +97,8 @@ def test_a_drift_is_told_from_a_transient_where_no_line_is_free_of_excitation(an
     found = investigate_any(recorded, PLANT.defaults(), effects=KNOWN)
     assert found.diagnosis.verdict == "nonstationary" and not found.diagnosis.causes
     assert "friction drifts within runs, by -" in found.diagnosis.notes[0]
+    gap = found.diagnosis.gap
+    assert gap.refit.nrmse_position == gap.explained.nrmse_position > 0.0
     assert not any("transient" in note for note in found.diagnosis.notes)
 
 
