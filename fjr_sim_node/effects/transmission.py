@@ -170,7 +170,7 @@ TRANSMISSION: tuple[Effect, ...] = (
         ),
         ({"stiffness_nm_rad": (0.01, 0.1), "relaxation_s": (0.6, 10.0)},),
         looks_like="constant torque",
-        rarer_than="external_spring",
+        rarer_than="gravity",
         axis="both",
     ),
     Effect(
