@@ -16,10 +16,12 @@ from fjr_records.experiment_folder import Override
 from fjr_records.periodic import RecordedExperiment, read_experiment
 from fjr_records.records import RecordSet, read_records, reference_optional
 
+from . import second_look
 from .drift_gate import drift_gate
 from .investigation import Investigation, investigate
 from .judgement import stopped
 from .model.nominal import datasheet
+from .model.simulated_rig import Model
 from .notes import NOT_HELD_OUT
 from .outcome.diagnosis import Diagnosis
 from .record_investigation import RecordInvestigation, investigate_records
@@ -27,6 +29,7 @@ from .which.search_space import TOLERANCE
 
 Progress = Callable[[str], None]
 
+_LEAST_LEFT = 0.5  # of the budget that a first look may take if there is to be a second one
 STEADY_SHARE = 0.5
 """Of the budget for explanations of steady periods that leave noise alone."""
 BESIDE = (
@@ -136,8 +139,37 @@ def investigate_any(
     explanation leaves noise alone, their runs are searched as records for causes beside a
     remainder; so are those of periods that do not repeat, whose verdict stays where nothing is
     found. An effect that steady periods would name is looked for in whole runs, too, where no run
-    was held out: nothing is named that nothing has tested.
+    was held out: nothing is named that nothing has tested. Where the datasheet itself stands in
+    the way, a second look takes it for further off.
     """
+    begun = time.monotonic()
+
+    def look(tolerance: float, budget_s: float) -> Investigation | RecordInvestigation:
+        return _look(recorded, nominal, tolerance, effects, budget_s, progress)
+
+    found = look(tolerance, budget_s)
+    took = time.monotonic() - begun
+    if not second_look.is_called_for(found) or took > _LEAST_LEFT * budget_s:
+        return found
+    progress("once more, for a datasheet that is further off")
+    second = look(second_look.WIDER * tolerance, budget_s - took)
+    bare = Model.nominal(nominal).plant
+    if not second_look.says_more(second.diagnosis, found.diagnosis, bare):
+        return found
+    said = second_look.said(second.diagnosis, bare, tolerance)
+    told = second.diagnosis.model_copy(update={"notes": [said, *second.diagnosis.notes]})
+    return replace(second, diagnosis=told)
+
+
+def _look(
+    recorded: RecordedExperiment | RecordSet,
+    nominal: Mapping[str, float],
+    tolerance: float,
+    effects: Sequence[str] | None,
+    budget_s: float,
+    progress: Progress,
+) -> Investigation | RecordInvestigation:
+    """Diagnose with fits that look so far from the datasheet; arguments as of `diagnose`."""
     begun = time.monotonic()
     if isinstance(recorded, RecordedExperiment):
         steady = investigate(

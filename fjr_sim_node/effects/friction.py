@@ -220,6 +220,7 @@ FRICTION: tuple[Effect, ...] = (
             {"motor_nm_s2_rad2": (0.02,), "link_nm_s2_rad2": (0.0,)},
             {"motor_nm_s2_rad2": (0.0,), "link_nm_s2_rad2": (0.02,)},
         ),
+        modifies="viscous_friction",
     ),
     Effect(
         "nonstationary",

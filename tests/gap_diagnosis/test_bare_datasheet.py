@@ -49,6 +49,13 @@ def test_what_changes_friction_waits_for_it_only_where_the_datasheet_has_none():
     assert founded(waiting, (), BARE, waiting) == waiting  # nobody looks for the whole
 
 
+def test_drag_waits_for_the_viscous_friction_that_a_datasheet_lacks():
+    every = ["viscous_friction", "quadratic_friction"]
+    assert founded(every, (), BARE, every) == every[:1]
+    assert founded(every, every[:1], BARE, every) == every
+    assert founded(every, (), {**BARE, "fvm": 0.1}, every) == every
+
+
 def test_all_effects_are_screened_anew_once_a_cause_has_closed_most_of_the_error():
     made = records({"torque_bias.torque_nm": BIAS_NM}, runs=2)
     fitter = CellFitter(Evidence(made, NOMINAL), NOMINAL, 0.1)

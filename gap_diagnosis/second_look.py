@@ -1,0 +1,83 @@
+"""A datasheet that is off by more than its tolerance: the second look at what a first one found.
+
+Fits look a few tolerances away from the datasheet. A stiffness that is off by half lies beyond;
+then nothing explains the gap, or what has a gain of its own does, such as an eccentric encoder.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from .investigation import Investigation
+from .notes import at_limits
+from .outcome.diagnosis import Diagnosis
+from .record_investigation import RecordInvestigation
+
+WIDER = 5.0
+"""How many tolerances the second look takes for one."""
+_GAIN = "encoder_eccentricity"
+_HALF = 0.5  # of the misfit: what leaves less does clearly better
+_ALIKE = 1.2  # times the misfit: what leaves less does about as well
+_COMMON = 0.2  # range of the logarithms of ratios to the datasheet, within which one gain holds all
+
+Found = Investigation | RecordInvestigation
+
+
+def is_called_for(found: Found) -> bool:
+    """Tell whether a fit ended as far from the datasheet as it may go, or a gain is named."""
+    if isinstance(found, Investigation):
+        if found.attribution is None or not found.diagnosis.steps:
+            return False
+        named = bool(found.diagnosis.effects)
+        best = found.attribution.best if named else found.attribution.refit
+    else:
+        best = found.found.best
+    ended = at_limits(best.space, best.solution.x, best.model.plant)
+    return bool(ended) or _GAIN in found.diagnosis.effects
+
+
+def says_more(second: Diagnosis, first: Diagnosis, nominal: Mapping[str, float]) -> bool:
+    """Tell whether the second look explains more, or as much by fewer effects.
+
+    All parameters off by one factor are a gain, and no better than one that is named.
+    """
+    left = [_left(diagnosis) for diagnosis in (second, first)]
+    if _GAIN in first.effects and _one_factor(second, nominal):
+        return False
+    if len(second.effects) < len(first.effects):
+        return left[0] <= _ALIKE * left[1]
+    return left[0] < _HALF * left[1]
+
+
+def said(second: Diagnosis, nominal: Mapping[str, float], tolerance: float) -> str:
+    """Return what of the datasheet is off by more than its tolerance."""
+    off = {name: ratio - 1.0 for name, ratio in _ratios(second, nominal).items()}
+    far = [
+        f"{name} is {100.0 * abs(by):.0f} % {'above' if by > 0.0 else 'below'} it"
+        for name, by in off.items()
+        if abs(by) > tolerance and name in ("jm", "j", "k0")
+    ]
+    told = f"; {', '.join(far)}" if far else ""
+    return (
+        f"Within {tolerance:.0%} of the datasheet less is explained, so it was taken for off by up "
+        f"to {min(WIDER * tolerance, 1.0):.0%}{told}."
+    )
+
+
+def _left(diagnosis: Diagnosis) -> float:
+    gap = diagnosis.gap.explained or diagnosis.gap.refit
+    return math.inf if gap is None or gap.chi2_per_dof is None else gap.chi2_per_dof
+
+
+def _ratios(diagnosis: Diagnosis, nominal: Mapping[str, float]) -> dict[str, float]:
+    return {
+        name: diagnosis.parameters[name].value / value
+        for name, value in nominal.items()
+        if name in diagnosis.parameters and value and math.isfinite(value)
+    }
+
+
+def _one_factor(diagnosis: Diagnosis, nominal: Mapping[str, float]) -> bool:
+    ratios = [r for r in _ratios(diagnosis, nominal).values() if r > 0.0]
+    return len(ratios) > 1 and math.log(max(ratios) / min(ratios)) < _COMMON
