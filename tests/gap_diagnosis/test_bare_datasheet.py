@@ -43,9 +43,10 @@ def test_the_whole_friction_is_named_and_no_part_of_it_in_its_place(found):
 def test_what_changes_friction_waits_for_it_only_where_the_datasheet_has_none():
     every = [*LOOKED_FOR, "position_friction"]
     waiting = ["asymmetric_friction", "position_friction"]
-    assert founded(every, (), BARE, every) == [e for e in every if e not in waiting]
-    assert founded(every, ("coulomb_friction",), BARE, every) == every
-    assert founded(every, (), {**BARE, "fs": 0.1}, every) == every
+    smooth = {**BARE, "fv": 0.1}
+    assert founded(every, (), smooth, every) == [e for e in every if e not in waiting]
+    assert founded(every, ("coulomb_friction",), smooth, every) == every
+    assert founded(every, (), {**smooth, "fs": 0.1}, every) == every
     assert founded(waiting, (), BARE, waiting) == waiting  # nobody looks for the whole
 
 
