@@ -58,10 +58,10 @@ def said(second: Diagnosis, nominal: Mapping[str, float], tolerance: float) -> s
         for name, by in off.items()
         if abs(by) > tolerance and name in ("jm", "j", "k0")
     ]
-    told = f"; {', '.join(far)}" if far else ""
+    told = f": {', '.join(far)}" if far else ""
     return (
-        f"Within {tolerance:.0%} of the datasheet less is explained, so it was taken for off by up "
-        f"to {min(WIDER * tolerance, 1.0):.0%}{told}."
+        f"If the datasheet is off by about {tolerance:.0%} at most, less is explained; so it was "
+        f"taken for further off{told}. Check its units, and the factor of the torque."
     )
 
 
