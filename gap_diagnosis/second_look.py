@@ -13,6 +13,8 @@ from .investigation import Investigation
 from .notes import at_limits
 from .outcome.diagnosis import Diagnosis
 from .record_investigation import RecordInvestigation
+from .which.cell_fits import CellFit
+from .which.fits import Fit
 
 WIDER = 5.0
 """How many tolerances the second look takes for one."""
@@ -26,6 +28,7 @@ Found = Investigation | RecordInvestigation
 
 def is_called_for(found: Found) -> bool:
     """Tell whether a fit ended as far from the datasheet as it may go, or a gain is named."""
+    best: Fit | CellFit
     if isinstance(found, Investigation):
         if found.attribution is None or not found.diagnosis.steps:
             return False
