@@ -63,8 +63,9 @@ def said(second: Diagnosis, nominal: Mapping[str, float], tolerance: float) -> s
     ]
     told = f": {', '.join(far)}" if far else ""
     return (
-        f"If the datasheet is off by about {tolerance:.0%} at most, less is explained; so it was "
-        f"taken for further off{told}. Check its units, and the factor of the torque."
+        f"If the datasheet is off by about {tolerance:.0%} at most, less is explained, or more "
+        f"effects are needed; so it was taken for further off{told}. Check its units, and the "
+        "factor of the torque."
     )
 
 

@@ -42,18 +42,19 @@ def move(state: np.ndarray, position: float, velocity: float) -> None:
     state[_SLACK] = position
 
 
-def complete(state: np.ndarray, torque: float, elapsed_s: float) -> None:
+def complete(state: np.ndarray, torque: float, elapsed_s: float, middle_rad: float) -> None:
     """Set what effects remember in a state that a rig without them has reached.
 
     Args:
         state: of a rig in motion, changed in place: a third mass moves with the link, a
-            cable has given way, and lag, slew limit and delay hold the torque.
+            cable pulls nowhere in the middle, and lag, slew limit and delay hold the torque.
         torque: last command (N m).
         elapsed_s: time since the rig was switched on, for what drifts.
+        middle_rad: mean position of the motion.
     """
     state[_TIME] = elapsed_s
     state[_EXTRA : _EXTRA + 2] = state[LINK : LINK + 2]
-    state[_SLACK] = state[MOTOR]
+    state[_SLACK] = middle_rad
     state[_LAGGED] = state[_SLEWED] = torque
     state[_RING:] = torque
 

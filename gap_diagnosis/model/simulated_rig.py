@@ -195,7 +195,8 @@ class Simulator:
         except InputError:
             return None
         now = elapsed + begin / self.sample_rate_hz
-        rig.complete(until.end.rig, float(until.torque[-1]), now)
+        middle = float(first.motor[-self._samples :].mean())
+        rig.complete(until.end.rig, float(until.torque[-1]), now, middle)
         return begin, until.end
 
     def many(self, models: Sequence[Model], which: Sequence[int] | None = None) -> np.ndarray:

@@ -219,7 +219,7 @@ def _drive(th: np.ndarray, rate: float, p: tuple[float, ...], e):
     held = (_HELD, p[J], p[FS], p[FSM], p[FV], 0.0, p[K0], p[K1])
     out = np.empty((5, th.size))
     state = np.zeros(11)
-    state[0] = state[10] = th[0]
+    state[0], state[10] = th[0], th.mean()  # two periods are too short for a slow cable to settle
     settle = 2
     for _ in range(settle):
         _follow(th, 1.0 / rate, held, e, state, out)
