@@ -112,8 +112,8 @@ def investigate(
     if gates.hint == "bad_data":
         diagnosis = stopped("bad_data", gates)
         return Investigation(recorded, model, gates, noise, held, {}, {}, None, diagnosis)
-    simulator.begin_near(model)
     std = _noise_std(recorded, noise)
+    simulator.begin_near(model, std, train)
     step = position_step([r.position for r in recorded.realizations])
     seen = std if step is None else widened(std, step, recorded.experiment.samples_per_period)
     fitter = Fitter(recorded, simulator, seen, model.plant, train, held, tolerance, effects)

@@ -97,6 +97,8 @@ class Effect:
             bare one.
         axis: which axes can have it; empty: flexible ones if it acts on transmission or link, else
             both.
+        settles_slowly: whether what it remembers may outlast the transient of the rig without it,
+            so that a model with it is played from rest.
     """
 
     identifier: str
@@ -118,6 +120,7 @@ class Effect:
     on_request: bool = False
     of_bare_plant: bool = False
     axis: Literal["", "both", "rigid"] = ""
+    settles_slowly: bool = False
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -119,6 +119,7 @@ TRANSMISSION: tuple[Effect, ...] = (
                 "damping_ratio": (0.03,),
             },
         ),
+        settles_slowly=True,
     ),
     Effect(
         "gravity",
@@ -172,6 +173,7 @@ TRANSMISSION: tuple[Effect, ...] = (
         looks_like="constant torque",
         rarer_than="gravity",
         axis="both",
+        settles_slowly=True,
     ),
     Effect(
         "transmission_stiffness",

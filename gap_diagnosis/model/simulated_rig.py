@@ -27,7 +27,9 @@ Signals = tuple[np.ndarray, np.ndarray]
 """One steady period of y (rad) and of u (N m) of every realization, float64 (n, N) each."""
 
 _MOST_STEPS, _MOST_STEPS_A_SAMPLE = 1e6, 20.0  # of the integration of one run
-_SETTLED = 1e-4  # of the rms position: what is left of a transient
+_SETTLED = (1e-6, 1e-4)
+"""Least and greatest part of the rms position that is left of a transient; between them the median
+standard deviation of a line, for a tail that lies in one line must not count there."""
 _SLOWER = 1.5  # times as long as it took the model that is simulated first
 _Result = TypeVar("_Result")
 _POOL = ThreadPoolExecutor(len(os.sched_getaffinity(0)))
@@ -65,6 +67,11 @@ class Model:
     def with_effects(self, effects: Mapping[str, float]) -> Model:
         """Return the model with further effect parameters set."""
         return replace(self, effects={**self.effects, **effects})
+
+    @property
+    def settles_slowly(self) -> bool:
+        """Whether an effect remembers what may be longer past than the rig takes to settle."""
+        return any(fx.EFFECTS[name.split(".")[0]].settles_slowly for name in self.effects)
 
     @property
     def whole_plant(self) -> dict[str, float]:
@@ -138,7 +145,7 @@ class Simulator:
     of u drives the model, held to that of y by an observer (`prediction`).
 
     A model that is near to another one is sooner in its steady state from that one's than from
-    rest (`begin_near`).
+    rest (`begin_near`), unless it remembers for longer.
     """
 
     def __init__(self, recorded: RecordedExperiment) -> None:
@@ -168,17 +175,22 @@ class Simulator:
         """How many samples of a realization are simulated from rest."""
         return self._periods * self._samples
 
-    def begin_near(self, model: Model) -> None:
-        """Let `many` begin in the steady state of a model, before the last period.
+    def begin_near(self, model: Model, noise_std: np.ndarray, which: Sequence[int]) -> None:
+        """Let `many` begin realizations in the steady state of a model, before the last period.
 
-        How long that is says the model's own way from rest: when its first period has come near
-        the last one.
+        How long before says the model's own way from rest: when its first period has come near
+        the last one, nearer where there is less noise.
+
+        Args:
+            model: the one to begin near.
+            noise_std: `NoiseLevels.of_outputs`, (realizations, outputs, lines), rad.
+            which: indices of the realizations; all others are played from rest.
         """
-        every = range(len(self._inputs))
-        begins = run_parallel(lambda index: self._begin_near(model, index), every)
-        self._begins = {i: begin for i, begin in zip(every, begins, strict=True) if begin}
+        noise = np.median(noise_std[:, 0], axis=1)
+        begins = run_parallel(lambda index: self._begin_near(model, index, noise[index]), which)
+        self._begins = {i: begin for i, begin in zip(which, begins, strict=True) if begin}
 
-    def _begin_near(self, model: Model, index: int) -> tuple[int, State] | None:
+    def _begin_near(self, model: Model, index: int, noise: float) -> tuple[int, State] | None:
         """Return from which sample on a realization has to be simulated, and the state before."""
         inputs, elapsed = self._inputs[index], self._elapsed[index]
         if self._stiff(model, index):
@@ -186,7 +198,8 @@ class Simulator:
         try:
             first = self._simulated(model, inputs, elapsed)
             off = np.abs(first.position[: self._samples] - first.position[-self._samples :])
-            limit = _SETTLED * float(np.std(first.position[-self._samples :]))
+            rms = float(np.std(first.position[-self._samples :]))
+            limit = np.clip(noise, *(share * rms for share in _SETTLED))
             settled = int(_SLOWER * np.flatnonzero(np.append(True, off > limit))[-1])
             begin = self.samples - self._samples - settled
             if begin <= 0:
@@ -259,7 +272,8 @@ class Simulator:
         return out.reshape(len(models), len(indices), 3, self._samples)
 
     def _one(self, job: tuple[Model, int, tuple[int, State] | None]) -> np.ndarray:
-        model, index, (first, begin) = job[0], job[1], job[2] or (0, None)
+        model, index, begun = job
+        first, begin = (0, None) if begun is None or model.settles_slowly else begun
         if self._stiff(model, index):
             return np.full((3, self._samples), np.nan)
         try:

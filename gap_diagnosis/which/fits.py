@@ -99,7 +99,7 @@ class Fitter:
             effects: identifiers to look for; None for all.
         """
         self.catalogue = catalogue(nominal, effects)
-        self.recorded, self._simulator = recorded, simulator
+        self.recorded, self._simulator, self._noise_std = recorded, simulator, noise_std
         self.levels = [realization.level for realization in recorded.realizations]
         self.misfit_of = lambda which: Misfit(recorded, simulator, noise_std, which)
         self.nominal = dict(nominal)
@@ -118,14 +118,17 @@ class Fitter:
         """Fit the base parameters alone, level after level added from the lowest amplitude up.
 
         At a large amplitude a loop near its stability margin answers erratically to a parameter
-        that is off; the low ones bring it near first.
+        that is off; the low ones bring it near first. From then on all models begin the training
+        realizations near the refit, so that none of them gains by where it begins.
         """
         space = Space(self.nominal, (), (), self.tolerance, self.scales)
         x = np.zeros(len(self.nominal))
         for highest in self._train_levels[:-1]:
             misfit = self.misfit_of([i for i in self.train.which if self.levels[i] <= highest])
             x = self.reached(space, x, misfit, _FIRST_STEPS).x
-        return self.solve((), space, x)
+        fit = self.solve((), space, x)
+        self._simulator.begin_near(fit.model, self._noise_std, self.train.which)
+        return self.solve((), space, fit.solution.x, known=fit.solution.jacobian)
 
     def rows(self, fit: Fit, which: Sequence[int]) -> np.ndarray:
         """Return the rows of a fit's Jacobian that belong to some of the training realizations."""
