@@ -167,7 +167,7 @@ TRANSMISSION: tuple[Effect, ...] = (
         (
             size("stiffness_nm_rad", "N m/rad", "Stiffness against quick motion", 0.0, 1e9),
             EffectParameter("relaxation_s", 1.0, "s", "Time in which its pull falls to 1/e",
-                            0.02, 1e4, fit=(0.2, 200.0)),
+                            0.02, 1e4, fit=(0.2, 2000.0)),
         ),
         ({"stiffness_nm_rad": (0.01, 0.1), "relaxation_s": (0.6, 10.0)},),
         looks_like="constant torque",

@@ -199,7 +199,7 @@ class Simulator:
             first = self._simulated(model, inputs, elapsed)
             off = np.abs(first.position[: self._samples] - first.position[-self._samples :])
             rms = float(np.std(first.position[-self._samples :]))
-            limit = np.clip(noise, *(share * rms for share in _SETTLED))
+            limit = min(max(noise, _SETTLED[0] * rms), _SETTLED[1] * rms)
             settled = int(_SLOWER * np.flatnonzero(np.append(True, off > limit))[-1])
             begin = self.samples - self._samples - settled
             if begin <= 0:
