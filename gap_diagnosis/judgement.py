@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
+from types import MappingProxyType
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from .which.attribution import Attribution
 from .which.confidence import confidence
 from .which.estimates import estimates, moved_by_scatter, relative_scatter
 from .which.fits import Fit, Fitter
+from .which.presence import at_its_bound
 from .which.ripples_passed import doubt_of_shape, ripples_passed
 
 NO_GAP = 2.0
@@ -79,8 +80,12 @@ def judge(
         said.append(_rounding(recorded, held, best, (signals[before], rounded), by, left))
     closed, bags = figures.position.closed, gates.gates[-1].bags
     moved = moved_by_scatter(shown, fitter.train.runs(), relative_scatter(bags))
-    passed = [ripples_passed(shown.model, effect, fitter.scales) for effect in named]
-    doubt = doubt_of_shape(min(passed, default=math.inf))
+    doubts = {
+        effect: doubt_of_shape(
+            ripples_passed(best.model, effect, fitter.scales), at_its_bound(best, effect)
+        )
+        for effect in named
+    }
     return _sure(
         Diagnosis(
             verdict=verdict,
@@ -99,7 +104,7 @@ def judge(
             next_experiment=_next(recorded, noise_std, attribution, verdict),
             notes=said,
         ),
-        doubt,
+        doubts,
     )
 
 
@@ -110,15 +115,20 @@ def stopped(verdict: Verdict, gates: GateReport) -> Diagnosis:
     return _sure(Diagnosis(verdict=verdict, confidence=0.0, gap=nothing, notes=said))
 
 
-def _sure(diagnosis: Diagnosis, doubt: float = 1.0) -> Diagnosis:
+def _sure(diagnosis: Diagnosis, doubts: Mapping[str, float] = MappingProxyType({})) -> Diagnosis:
     """Return a diagnosis with its confidence and causes, which follow from its other fields.
 
     Args:
         diagnosis: without them.
-        doubt: factor of the confidence, see `doubt_of_shape`.
+        doubts: factor of the presence of each named effect, see `doubt_of_shape`.
     """
-    sure = diagnosis.model_copy(update={"confidence": doubt * confidence(diagnosis)})
-    return sure.model_copy(update={"causes": causes(sure)})
+    found = confidence(diagnosis)
+    present = {effect: doubts.get(effect, 1.0) * found for effect in diagnosis.effects}
+    told = {
+        "confidence": min(present.values(), default=found),
+        "causes": causes(diagnosis, present),
+    }
+    return diagnosis.model_copy(update=told)
 
 
 def _next(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from fjr_records.periodic import RecordedExperiment
 
 from ..outcome.diagnosis import Cause, Diagnosis, EvidenceKind, Gap, Gaps, Stage, Step
@@ -37,15 +39,20 @@ def _step(gap: Gap | None, stage: Stage, added: str | None = None) -> Step:
     )
 
 
-def causes(diagnosis: Diagnosis) -> list[Cause]:
-    """Return the named effects as causes; the share of one alone is that of the gap it closes."""
+def causes(diagnosis: Diagnosis, present: Mapping[str, float]) -> list[Cause]:
+    """Return the named effects as causes; the share of one alone is that of the gap it closes.
+
+    Args:
+        diagnosis: without causes.
+        present: how surely each named effect is there.
+    """
     figures = diagnosis.gap_figures
     alone = len(diagnosis.effects) == 1 and figures is not None
     return [
         Cause(
             effect=effect,
             others=members[1:],
-            present=diagnosis.confidence,
+            present=present[effect],
             share=figures.position.closed if alone and figures is not None else None,
             parameters={
                 name: estimate

@@ -27,6 +27,7 @@ from .estimates import (
     standard_errors,
     together_sure,
 )
+from .fits import Fit
 from .gains import fall
 
 LEAST_INVARIANCE_P = 0.01
@@ -77,7 +78,7 @@ def beyond_zero(effect: str, found: Mapping[str, Estimate], fall: float) -> bool
     return len(sizes) > 1 and together_sure(fall, len(sizes))
 
 
-def at_its_bound(fit: CellFit, effect: str) -> bool:
+def at_its_bound(fit: CellFit | Fit, effect: str) -> bool:
     """Tell whether a parameter of an effect lies where the fit may go no further.
 
     Zero and one are no such bounds: they are what a ratio or a share can be.

@@ -51,6 +51,10 @@ class Ranking:
         fits = [fit for fit in self.fits.values() if len(fit.effects) == count and fit.converged]
         return sorted(fits, key=self.misfit)
 
+    def nearest(self, count: int) -> list[Fit]:
+        """Return the fits of `count` effects, best first, those that were given up as well."""
+        return sorted((f for f in self.fits.values() if len(f.effects) == count), key=self.misfit)
+
     def close(self, ranked: Sequence[Fit], times: float) -> list[Fit]:
         """Return which of some fits, best first, leave less than `times` what the first does."""
         return [fit for fit in ranked if self.misfit(fit) < times * self.misfit(ranked[0])]

@@ -32,6 +32,7 @@ _WORTH_A_HARMONIC = 1.3
 _SECOND_PROMISE = 1.2  # a second effect that has not gained that much after a few steps is dropped
 _PROMISING_SECONDS = 5
 _PROMISING_PARTNERS = 2
+_PARENTS = 2  # leading effects unlike each other, beside which a second one is looked for
 _HELD = 2  # of the leading effects: what holds one of them is tried as well
 _SCREENED = 2  # times as many are tried at several sizes as are fitted
 _SCALED, _FITTED = 12, 8  # effects that are tried at more sizes, and of these fitted
@@ -190,7 +191,8 @@ class Search:
         """Search forward, backward and by swaps for a second effect; return how many to name."""
         if self._found.misfit(best) < _WORTH_A_PAIR or self._found.owed_to_its_form(best):
             return 1
-        for parent in self._found.unlike(self._found.ranked(1))[:2]:
+        self._take_parents_further(best)
+        for parent in self._found.unlike(self._found.ranked(1))[:_PARENTS]:
             if self._found.misfit(parent) < _NEAR * self._found.misfit(best):
                 others = [e for e in self._fitter.catalogue if e not in parent.effects]
                 self._extend(parent, others, _PROMISING_SECONDS)
@@ -205,6 +207,13 @@ class Search:
             self._drop_scales()
             best = self._found.sure(1)[0]
         return 2 if self._pair_called_for(best, self._found.sure(2)) else 1
+
+    def _take_parents_further(self, best: Fit) -> None:
+        """Take to their end the fits that were given up, but would be parents of pairs."""
+        for fit in self._found.unlike(self._found.nearest(1))[:_PARENTS]:
+            if not fit.converged and self._found.misfit(fit) < _NEAR * self._found.misfit(best):
+                self._progress(f"{' + '.join(fit.effects)}, further")
+                self._found.fits[fit.effects] = self._fitter.continued(fit)
 
     def _pair_called_for(self, best: Fit, pairs: Sequence[Fit]) -> bool:
         return bool(pairs) and self._found.calls_for(best, pairs[0], SECOND_GAIN)
@@ -233,13 +242,17 @@ class Search:
                 del self._found.fits[pair.effects]
 
     def _swap(self, best: Fit) -> None:
-        """Fit the best pair with each member replaced by what is near it, holds it or leads."""
+        """Fit the best pair with each member replaced by what is near it, holds it or leads.
+
+        And by what it modifies, where the datasheet lacks that.
+        """
         pairs = self._found.ranked(2)
         if not pairs or not self._found.calls_for(best, pairs[0], SECOND_GAIN):
             return
         for kept, swapped in (pairs[0].effects, pairs[0].effects[::-1]):
             alike = partners([swapped], set(self._fitter.catalogue) - {kept, swapped})
             alike += holders([swapped], self._fitter.catalogue)
+            alike += {fx.EFFECTS[swapped].modifies} & set(self._fitter.catalogue) - {kept}
             leading = [fit.effects[0] for fit in self._found.unlike(self._found.ranked(1))[:_HELD]]
             alike += [e for e in leading if e not in (kept, swapped, *alike)]
             if alike:
