@@ -94,10 +94,10 @@ class Stepwise:
                 break
             fits = self._extended(found.best, found.steps[0])
             found.rivals[len(found.best.effects) + 1] = fits
-            chosen = self._chosen(fits, found.best)
+            least = self._least_closed(found)
+            closing = [f for f in fits if closed(self._fitter, f, found.best) >= least]
+            chosen = self._chosen(closing, found.best)
             if chosen is None:
-                break
-            if closed(self._fitter, chosen, found.best) < self._least_closed(found):
                 break
             found.alternatives[chosen.effects[-1]] = self._tied(chosen, fits, found.best)
             found.steps.append(chosen)

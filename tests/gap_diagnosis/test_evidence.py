@@ -23,9 +23,9 @@ from gap_diagnosis.outcome.diagnosis import Figure
 from gap_diagnosis.which import unseen_friction
 from gap_diagnosis.which.cell_fits import CellFitter
 from gap_diagnosis.which.cell_weights import independent
-from gap_diagnosis.which.gains import Gain, fall, gain
+from gap_diagnosis.which.gains import Gain, closed, fall, gain
 from gap_diagnosis.which.presence import at_its_bound, beyond_zero, cell_estimates, invariance
-from gap_diagnosis.which.stepwise import Stepwise
+from gap_diagnosis.which.stepwise import LEAST_CLOSED, Stepwise
 
 RATE, NOISE = 500.0, 2e-5
 LAW = pd_filtered.CONTROLLER.check({"sample_rate_hz": RATE})
@@ -174,6 +174,20 @@ def test_a_leading_fit_is_taken_to_its_end_before_it_is_compared(monkeypatch):
     (fit,) = Stepwise(fitter, ["torque_saturation"])._extended(refit, refit)
     assert fit.solution.converged
     assert fit.model.effects["torque_saturation.limit_nm"] == pytest.approx(60.0, rel=0.01)
+
+
+def test_what_gains_but_closes_little_does_not_end_the_search(monkeypatch):
+    """A lag shows in quiet parts; the limit beside which it does holds nearly all of the gap."""
+    fitter, refit, fit = biased()
+    loudest = refit.left == refit.left.max(axis=0)
+    left = np.where(loudest, 2.0, 1e-6) * refit.left
+    quiet = replace(fit, effects=("delay",), left=left, acts=None)
+    assert gain(fitter, quiet, refit).mean > gain(fitter, fit, refit).mean
+    assert closed(fitter, quiet, refit) < LEAST_CLOSED < closed(fitter, fit, refit)
+    search = Stepwise(fitter, ["torque_bias", "delay"])
+    found = [quiet, fit]
+    monkeypatch.setattr(search, "_extended", lambda parent, _: [] if parent.effects else found)
+    assert search.run(refit).best is fit
 
 
 @pytest.mark.parametrize("bias", [0.05, 0.1])
