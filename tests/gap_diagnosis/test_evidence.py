@@ -180,7 +180,7 @@ def test_what_gains_but_closes_little_does_not_end_the_search(monkeypatch):
     """A lag shows in quiet parts; the limit beside which it does holds nearly all of the gap."""
     fitter, refit, fit = biased()
     loudest = refit.left == refit.left.max(axis=0)
-    left = np.where(loudest, 2.0, 1e-6) * refit.left
+    left = np.where(loudest, 10.0, 1e-6) * refit.left
     quiet = replace(fit, effects=("delay",), left=left, acts=None)
     assert gain(fitter, quiet, refit).mean > gain(fitter, fit, refit).mean
     assert closed(fitter, quiet, refit) < LEAST_CLOSED < closed(fitter, fit, refit)
