@@ -137,13 +137,14 @@ def _next(
     attribution: Attribution,
     verdict: Verdict,
 ) -> NextExperiment | None:
-    """Return the experiment that separates what is tied, or the best where nothing explains."""
-    fits: list[Fit] = []
-    if verdict == "ambiguous":
-        fits = [attribution.best, *attribution.tied]
-    elif verdict == "unexplained":
-        fits = [fit for fit in attribution.candidates if fit.converged][:2]
-    return next_experiment(recorded, noise_std, fits)
+    """Return the experiment that separates what is tied.
+
+    Where nothing explains the gap the whole runs are searched next, by which no experiment is
+    chosen.
+    """
+    if verdict != "ambiguous":
+        return None
+    return next_experiment(recorded, noise_std, [attribution.best, *attribution.tied])
 
 
 def _verdict(attribution: Attribution, misfits: Mapping[str, float], gates: GateReport) -> Verdict:
