@@ -96,7 +96,7 @@ def runs_of(joint: Joint, records: RecordSet) -> list[Run]:
     p = plant.coefficients(joint.values)
     runs = []
     for index in held or range(len(records.records)):
-        drive = evidence.simulator.drive(index)
+        drive = evidence.player.drive(index)
         if isinstance(records.records[index].description, Experiment) and not drive.observed:
             drive = replace(drive, start=(0.0, 0.0), entry=None)  # periods begin at rest
         try:

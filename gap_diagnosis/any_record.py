@@ -21,6 +21,7 @@ from .drift_gate import drift_gate
 from .investigation import Investigation, investigate
 from .judgement import stopped
 from .model.nominal import datasheet
+from .model.quasi_static import Stations, stations
 from .model.simulated_rig import Model
 from .notes import NOT_HELD_OUT
 from .outcome.diagnosis import Diagnosis
@@ -139,8 +140,9 @@ def investigate_any(
     explanation leaves noise alone, their runs are searched as records for causes beside a
     remainder; so are those of periods that do not repeat, whose verdict stays where nothing is
     found. An effect that steady periods would name is looked for in whole runs, too, where no run
-    was held out: nothing is named that nothing has tested. Where the datasheet itself stands in
-    the way, a second look takes it for further off.
+    was held out: nothing is named that nothing has tested. Records of which nothing is named are
+    compared by torque alone where they are slow enough for that. Where the datasheet itself stands
+    in the way, a second look takes it for further off.
     """
     begun = time.monotonic()
 
@@ -189,10 +191,38 @@ def _look(
             progress("drift within runs")
             return _drifting(steady, whole)
         return _beside(whole, steady, UNSTEADY if unsteady else UNTESTED if untested else BESIDE)
-    return investigate_records(
-        recorded, nominal, tolerance=tolerance, effects=effects, budget_s=budget_s,
-        progress=progress,
-    )  # fmt: skip
+    return _of_records(recorded, nominal, tolerance, effects, budget_s, progress)
+
+
+def _of_records(
+    records: RecordSet,
+    nominal: Mapping[str, float],
+    tolerance: float,
+    effects: Sequence[str] | None,
+    budget_s: float,
+    progress: Progress,
+) -> RecordInvestigation:
+    """Diagnose records as they came, slow ones by their torque alone as far as that goes.
+
+    A loop that is known is played all the same, and first: it shows more than torques do.
+    """
+    begun = time.monotonic()
+
+    def look(slow: Stations | None) -> RecordInvestigation:
+        return investigate_records(
+            records, nominal, tolerance=tolerance, effects=effects, progress=progress, slow=slow,
+            budget_s=max(budget_s - (time.monotonic() - begun), 0.0),
+        )  # fmt: skip
+
+    slow = stations(records, nominal)
+    if slow is None:
+        return look(None)
+    known = any(r.controller and r.reference is not None for r in records.records)
+    first = look(None if known else slow)
+    if first.diagnosis.causes:
+        return first
+    second = look(slow if known else None)
+    return second if second.diagnosis.causes or not known else first
 
 
 def _drifting(steady: Investigation, whole: RecordInvestigation) -> Investigation:

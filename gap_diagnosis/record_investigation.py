@@ -8,14 +8,19 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
-from fjr_kit.errors import InputError
+import numpy as np
+
 from fjr_records.driven import wrong_sign
-from fjr_records.records import Record, RecordSet
+from fjr_records.records import RecordSet
 
 from .gates.bag_deviations import GROUPS
 from .gates.bags_gate import as_bags, record_changes, scattering
+from .how_far.record_ledger import Ledger
 from .kept_causes import kept
 from .model.evidence import Evidence
+from .model.quasi_static import NOTE as QUASI_STATIC
+from .model.quasi_static import Stations
+from .model.record_length import within
 from .model.record_torque import CONTINUOUS, with_continuous_torque
 from .model.simulated_rig import Model
 from .notes import at_limits
@@ -38,10 +43,11 @@ ASSUMED = (
     f"for {100 * SCATTER:.0f} %. Two runs more than levels that all move enough show it."
 )
 
-LEAST_SAMPLES = 64
-"""Of each record: eight of the shortest windows."""
-LONGEST_S = 300.0
-"""Of all records together, what is played at the most (s)."""
+LOST = (
+    "The best explanation still misses more than the whole motion, so it predicts nothing and none "
+    "of its causes is named: check the datasheet, the factor of the torque, and whether the runs "
+    "are sampled fast enough for the rig."
+)
 
 _SHOWN = 3
 """Most runs of which the same is said."""
@@ -86,6 +92,7 @@ def investigate_records(
     effects: Sequence[str] | None = None,
     budget_s: float = math.inf,
     progress: Progress = lambda _: None,
+    slow: Stations | None = None,
 ) -> RecordInvestigation:
     """Diagnose the gap between recorded runs and the nominal simulation.
 
@@ -96,6 +103,7 @@ def investigate_records(
         effects: identifiers to look for; None for all.
         budget_s: time for search and tests together; what is begun is ended.
         progress: told what is done.
+        slow: stations of the records, where they are to be compared by torque alone.
 
     Raises:
         InputError: records too short for any window, a controller that is described badly, or an
@@ -104,21 +112,35 @@ def investigate_records(
     begun = time.monotonic()
     model = Model.nominal(nominal)
     names = catalogue(model.plant, effects)
-    records, cut = _within(records)
-    progress("windows and noise")
-    fitter, refit, heard = _refitted(records, nominal, tolerance, progress)
+    if slow is None:
+        records, cut = within(records)
+        progress("windows and noise")
+        fitter, refit, heard = _refitted(records, nominal, tolerance, progress)
+    else:
+        cut, heard = [], [QUASI_STATIC]
+        progress("torque of the slow motion")
+        fitter = CellFitter(Evidence(records, nominal, slow), model.plant, tolerance)
+        refit = fitter.refit()
     evidence = fitter.evidence
     found = Stepwise(fitter, names, progress, begun + _SEARCH_SHARE * budget_s).run(refit)
     progress("scatter from run to run")
     bags, scatter, said = _run_scatter(fitter, found.best)
     heard += said
     found, tested = kept(fitter, found, scatter, progress)
+    if tested and not _follows(fitter, found.best):
+        found, tested = replace(found, steps=found.steps[:1]), []
+        heard.append(LOST)
     progress("what may stand in for a cause")
     alternatives = {t.effect: _alternatives(fitter, found, t, names) for t in tested}
     progress("judgement")
     notes = [*records.notes, *cut, *heard, *_notes(evidence, found)]
     diagnosis = judge_records(fitter, model, found, tested, alternatives, bags, scatter, notes)
     return RecordInvestigation(fitter, model, found, tuple(tested), diagnosis)
+
+
+def _follows(fitter: CellFitter, fit: CellFit) -> bool:
+    """Tell whether a fit misses less than the motion itself on the parts that report."""
+    return float(np.mean(Ledger(fitter.evidence).squares(fit.model))) < 1.0
 
 
 def _refitted(
@@ -151,39 +173,6 @@ def _late(fitter: CellFitter, refit: CellFit) -> CellFit:
     if delayed is None or fitter.gains(delayed, refit).sum() <= 0.0:
         return refit
     return delayed
-
-
-def _within(records: RecordSet) -> tuple[RecordSet, list[str]]:
-    """Refuse a record that is too short, and cut those that are too long together; say so."""
-    for record in records.records:
-        if record.samples < LEAST_SAMPLES:
-            raise InputError(
-                f"{record.name}: holds {record.samples} samples, too few to cut into windows; "
-                f"record {LEAST_SAMPLES} or more."
-            )
-    total = sum(r.samples for r in records.records) / records.sample_rate_hz
-    if total <= LONGEST_S:
-        return records, []
-    share = LONGEST_S / total
-    kept = [_first(record, max(int(share * record.samples), 1)) for record in records.records]
-    note = (
-        f"The records last {total:.0f} s; the first {100 * share:.0f} % of each are used, "
-        f"{LONGEST_S:.0f} s in all."
-    )
-    return replace(records, records=tuple(kept)), [note]
-
-
-def _first(record: Record, samples: int) -> Record:
-    reference, link = (
-        None if signal is None else signal[:samples] for signal in (record.reference, record.link)
-    )
-    return replace(
-        record,
-        reference=reference,
-        torque=record.torque[:samples],
-        position=record.position[:samples],
-        link=link,
-    )
 
 
 def _run_scatter(
@@ -236,6 +225,8 @@ def _does_as_well(
 
 
 def _notes(evidence: Evidence, found: Found) -> list[str]:
+    if evidence.slow:
+        return _notes_of_fit(found)
     notes = list(evidence.simulator.loop.notes)
     doubted = [(r.name, wrong_sign(r.torque, r.position)) for r in evidence.records.records]
     notes += [f"{name}: {doubt}." for name, doubt in doubted if doubt is not None][:_SHOWN]
@@ -258,8 +249,12 @@ def _notes(evidence: Evidence, found: Found) -> list[str]:
             "position: below that, errors show smaller than they are, and the figures of the "
             "torque are those of what the observer adds."
         )
+    return [*notes, *_notes_of_fit(found)]
+
+
+def _notes_of_fit(found: Found) -> list[str]:
     best = found.best
-    notes += at_limits(best.space, best.solution.x, best.model.plant)
+    notes = at_limits(best.space, best.solution.x, best.model.plant)
     if best.effects and not best.solution.converged:
         notes.append(
             f"The fit of {' + '.join(best.effects)} has not converged: the sizes, and their "

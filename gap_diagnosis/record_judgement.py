@@ -221,6 +221,7 @@ def judge_records(
             reported_on=evidence.reported_on,
             controller=evidence.simulator.loop.kind,
             excitation="record",
+            compared="torque" if evidence.slow else "motion",
         ),
         causes=causes,
         steps=steps,

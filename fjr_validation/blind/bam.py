@@ -139,7 +139,7 @@ class _Ladder:
                 equal = friction.pop(one)
                 friction |= {f"load_motor{both}": equal, f"load_external{both}": equal}
         plant = {**self._problem.nominal, "jm": friction.pop("jm")}
-        simulator, rate = self._problem.evidence.simulator, self._problem.sample_rate_hz
+        simulator, rate = self._problem.evidence.player, self._problem.sample_rate_hz
         return {i: play(simulator.drive(i), rate, plant, friction) for i in which}
 
     def mattering(self, values: Mapping[str, float]) -> list[str]:

@@ -185,7 +185,7 @@ class _Identification:
         spec = self._spec()
         model = spec.compile()
         record = problem.evidence.records.records[index]
-        drive = problem.evidence.simulator.drive(index)
+        drive = problem.evidence.player.drive(index)
         times = self._period * np.arange(record.samples)
         mapping = {"position": (sysid.SignalType.MjSensor, np.array([0]))}
         measured = sysid.TimeSeries(times, record.position[:, None], mapping)
@@ -249,7 +249,7 @@ class _Identification:
 
     def _play(self, params: Any, which: Sequence[int]) -> Positions:
         model = self._sysid.apply_param_modifiers(params, self._spec())
-        drive = self._problem.evidence.simulator.drive
+        drive = self._problem.evidence.player.drive
         return {index: self._closed_loop(model, drive(index)) for index in which}
 
     def _named(self, datasheet: Any, found: Any) -> list[str]:

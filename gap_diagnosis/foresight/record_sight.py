@@ -78,7 +78,7 @@ class RecordSight:
 
     def too_stiff(self, model: Model) -> bool:
         """Tell whether a model would take too long to play in one of the records."""
-        simulator = self._evidence.simulator
+        simulator = self._evidence.player
         return any(simulator.too_stiff(model, i) for i in range(len(simulator.records.records)))
 
     def strength(self, change: np.ndarray) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
@@ -42,6 +43,8 @@ class RecordComparison:
         errors: rms error of the position in each band by name of the model, (bands,): over the
             noise where that is known, else over the motion in the band.
         over_velocity, over_angle: torque that a model lacks by its name.
+        compared: what of rig and model was; where it is the torque, `position` of a model says
+            nothing more.
     """
 
     level: int
@@ -53,6 +56,7 @@ class RecordComparison:
     errors: Mapping[str, np.ndarray]
     over_velocity: Mapping[str, Curve]
     over_angle: Mapping[str, Curve]
+    compared: Literal["motion", "torque"] = "motion"
 
 
 def compare_records(
@@ -121,6 +125,7 @@ def _compare(
         errors=errors,
         over_velocity={name: binned(velocity, torque) for name, torque in lacking.items()},
         over_angle={name: binned(record.position, torque) for name, torque in lacking.items()},
+        compared="torque" if evidence.slow else "motion",
     )
 
 

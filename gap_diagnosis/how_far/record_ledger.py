@@ -51,11 +51,12 @@ class Ledger:
             for run, r in zip(runs, (evidence.records.records[i] for i in self.runs), strict=True)
         ]
         chi2 = float(np.mean(errors**2 / self._floor)) if evidence.noise.known else math.nan
+        missed = float(np.sqrt(np.mean(self.squares(model))))
         return Step(
             added=added,
             stage=stage,
-            nrmse_position=float(np.sqrt(np.mean(self.squares(model)))),
-            nrmse_torque=float(np.sqrt(np.mean(torque))),
+            nrmse_position=None if evidence.slow else missed,
+            nrmse_torque=missed if evidence.slow else float(np.sqrt(np.mean(torque))),
             chi2_per_dof=chi2,
         )
 
@@ -88,7 +89,7 @@ class Ledger:
                     level=evidence.records.levels[level],
                     band_hz=(float(low * evidence.line_hz), float(high * evidence.line_hz)),
                     lines="slow" if band == 0 else "all",
-                    signal="position",
+                    signal="torque" if evidence.slow else "position",
                     sigma=float(sigma[cell]) if known else math.nan,
                 )
             )
@@ -123,7 +124,7 @@ class Ledger:
         smooth = max(int(evidence.records.sample_rate_hz / (evidence.lines * evidence.line_hz)), 1)
         finite = all(np.isfinite(m).all() for m in missing)
         return Remainder(
-            nrmse_position=float(np.sqrt(left.mean())),
+            nrmse_position=None if evidence.slow else float(np.sqrt(left.mean())),
             share=float(left.sum() / max(gap.sum(), 1e-300)),
             looks_like=looks_like(records, missing, smooth) if finite else [],
             where=self.places_of_error(best),

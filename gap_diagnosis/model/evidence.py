@@ -8,6 +8,7 @@ record: some parts are for fitting, others for selecting, others for reporting.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -19,6 +20,7 @@ from fjr_records.record_noise import RecordNoise, band_lines, record_noise
 from fjr_records.records import RecordSet
 
 from .lapped import lapped, windows_in
+from .quasi_static import QuasiStaticSimulator, Stations
 from .record_rig import RecordSimulator
 from .simulated_rig import Model
 
@@ -61,8 +63,9 @@ class Evidence:
     """The errors of models on records.
 
     Attributes:
-        records: the runs.
-        noise: of their positions.
+        records: the runs, or their stations.
+        slow: whether they are compared by torque alone.
+        noise: of their positions; not known of a torque.
         simulator: plays them.
         parts: blocks of windows; every window inside a record belongs to one.
         hop: half the length of a window, samples.
@@ -70,27 +73,39 @@ class Evidence:
         edges: (bands + 1,), first line of each band; band 0 is line 0, mean and slow motion.
     """
 
-    def __init__(self, records: RecordSet, nominal: Mapping[str, float]) -> None:
+    def __init__(
+        self, records: RecordSet, nominal: Mapping[str, float], slow: Stations | None = None
+    ) -> None:
         """Cut the records; raise InputError for a controller that is described badly.
 
         Args:
             records: the runs.
             nominal: datasheet values by the names of PLANT.
+            slow: their stations, where they are compared by torque alone (`quasi_static`).
         """
-        self.records = records
+        self.slow = slow is not None
+        self.records = records = records if slow is None else slow.records
         rate = records.sample_rate_hz
         shortest = min(r.samples for r in records.records)
         levels = [r.level for r in records.records]
         alone = any(levels.count(level) == 1 for level in levels)
         windows = 2 * WINDOWS if alone else WINDOWS
-        hop = min(shortest / (windows + 1), 0.5 * _LONGEST_WINDOW_S * rate)
+        hop = shortest / (windows + 1)
+        if slow is None:
+            hop = min(hop, 0.5 * _LONGEST_WINDOW_S * rate)
         self.hop = max(int(hop - hop % (16 if hop >= _LONG else 2)), 8)
         self._measured = [lapped(r.position, self.hop) for r in records.records]
-        self.noise: RecordNoise = record_noise(records)
-        power = np.mean(np.concatenate(self._measured) ** 2, axis=0)
-        self.lines = band_lines(power, self.noise.std_rad**2)
+        self.simulator: RecordSimulator | QuasiStaticSimulator
+        if slow is not None:
+            self.noise, self.lines = RecordNoise("none", math.nan), self.hop
+            self.simulator = QuasiStaticSimulator(slow)
+        else:
+            self.noise = record_noise(records)
+            power = np.mean(np.concatenate(self._measured) ** 2, axis=0)
+            self.lines = band_lines(power, self.noise.std_rad**2)
+            top_hz = self.lines * self.line_hz
+            self.simulator = RecordSimulator(records, self.noise, top_hz, nominal)
         self.edges = _edges(self.lines)
-        self.simulator = RecordSimulator(records, self.noise, self.lines * self.line_hz, nominal)
         frequency = (np.arange(self.lines) + 0.5) * self.line_hz
         self._held = [
             lapped(r.torque, self.hop)[:, : self.lines]
@@ -114,6 +129,12 @@ class Evidence:
     def cells(self) -> int:
         """Number of cells."""
         return len(self.records.levels) * self.bands
+
+    @property
+    def player(self) -> RecordSimulator:
+        """What plays the runs; that of slow ones plays nothing."""
+        assert isinstance(self.simulator, RecordSimulator)
+        return self.simulator
 
     def parts_for(self, *purposes: Purpose) -> tuple[int, ...]:
         """Return the indices of the parts for some purposes."""
@@ -156,8 +177,11 @@ class Evidence:
         return np.clip(lapped(position, self.hop)[:, : self.lines] - measured, -most, most)
 
     def measured(self, which: Sequence[int]) -> np.ndarray:
-        """Return the lines of the measured position on parts, (errors,), rad."""
-        return self._on_parts(self._measured, which)
+        """Return the lines of what is compared, as it was measured, on parts, (errors,), rad.
+
+        A torque is that motion which it makes against what holds the rig.
+        """
+        return self._on_parts(self._held if self.slow else self._measured, which)
 
     def _on_parts(self, lines: Sequence[np.ndarray], which: Sequence[int]) -> np.ndarray:
         pieces = [

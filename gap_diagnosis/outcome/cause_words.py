@@ -29,6 +29,10 @@ EXCITATION: dict[str, str] = {
     "periodic": "Steady periods were compared.",
     "record": "The records were compared as they came, in windows.",
 }
+TORQUE = (
+    "Inertia takes next to none of the torque, so no motion was simulated: the torque that a model "
+    "needs along the recorded motion was compared with the recorded one."
+)
 LEAST_PERCENT = 1e-3
 """A smaller share is shown as less than that: its digits mean nothing to a reader."""
 _MOST_DIGITS = 6
@@ -37,12 +41,10 @@ _AS_NOISE = 1.5  # times what noise leaves: a remainder no greater than that has
 
 def evidence_sentences(evidence: EvidenceKind) -> list[str]:
     """Return what the diagnosis rests on, a sentence for each kind of evidence."""
-    return [
-        EXCITATION[evidence.excitation],
-        CONTROLLER[evidence.controller],
-        NOISE[evidence.noise],
-        REPORTED[evidence.reported_on],
-    ]
+    how = [EXCITATION[evidence.excitation], CONTROLLER[evidence.controller]]
+    if evidence.compared == "torque":
+        how = [TORQUE]
+    return [*how, NOISE[evidence.noise], REPORTED[evidence.reported_on]]
 
 
 def remainder_sentences(diagnosis: Diagnosis) -> list[str]:
@@ -53,11 +55,14 @@ def remainder_sentences(diagnosis: Diagnosis) -> list[str]:
     said = []
     floor = diagnosis.gap.noise_floor
     noise = None if floor is None else floor.nrmse_position
-    if left.nrmse_position is not None and noise and left.nrmse_position < _AS_NOISE * noise:
-        return [f"{percent(left.nrmse_position)} of the motion remains, which noise explains."]
-    if left.nrmse_position is not None:
+    missed = left.nrmse_position
+    if diagnosis.compared == "torque" and diagnosis.steps:
+        missed = diagnosis.missed(diagnosis.steps[-1])
+    if missed is not None and noise and missed < _AS_NOISE * noise:
+        return [f"{percent(missed)} of the motion remains, which noise explains."]
+    if missed is not None:
         share = "" if left.share is None else f", {percent(left.share)} of the refit's squared gap"
-        said.append(f"{percent(left.nrmse_position)} of the motion remains{share}.")
+        said.append(f"{percent(missed)} of the {diagnosis.compared} remains{share}.")
     if left.looks_like:
         said.append(f"The torque that is still missing goes with {'; '.join(left.looks_like)}.")
     elif left.where:

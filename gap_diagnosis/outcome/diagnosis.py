@@ -174,7 +174,7 @@ class Remainder(ResultModel):
     """What all named causes leave.
 
     Attributes:
-        nrmse_position: rms error over rms of the position.
+        nrmse_position: rms error over rms of the position; None where torques were compared.
         share: of the squared gap that the refit left.
         looks_like: what it goes with, strongest first; empty where it goes with nothing.
         where: where it lies, strongest first.
@@ -195,12 +195,15 @@ class EvidenceKind(ResultModel):
             no fit has seen; none if the fit has seen all.
         controller: whether the loop was simulated, with gains that were known or fitted, or not.
         excitation: whether steady periods were compared, or records as they came.
+        compared: what of rig and model was compared: their motion, or, in motion too slow for
+            inertia to count, the torque alone.
     """
 
     noise: Literal["repeats", "standstill", "residual", "none"]
     reported_on: ReportedOn
     controller: Literal["known", "gains_fitted", "unknown"]
     excitation: Literal["periodic", "record"]
+    compared: Literal["motion", "torque"] = "motion"
 
 
 class Candidate(ResultModel):
@@ -282,3 +285,14 @@ class Diagnosis(Document):
     def reported_on(self) -> ReportedOn:
         """What all figures were computed on."""
         return "records" if self.evidence is None else self.evidence.reported_on
+
+    @property
+    def compared(self) -> Literal["motion", "torque"]:
+        """What of rig and model was compared."""
+        return "motion" if self.evidence is None else self.evidence.compared
+
+    def missed(self, gap: Gap | Step | None) -> float | None:
+        """Return the relative error of what was compared; None where it is not known."""
+        if gap is None:
+            return None
+        return gap.nrmse_position if self.compared == "motion" else gap.nrmse_torque

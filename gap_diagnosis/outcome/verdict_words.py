@@ -142,13 +142,13 @@ def action(diagnosis: Diagnosis) -> str:
 def is_better(diagnosis: Diagnosis) -> bool:
     """Tell whether updated.yaml comes nearer to the rig than the nominal parameters.
 
-    It does not if both its error of the position and its misfit are as large or larger.
+    It does not if both its error and its misfit are as large or larger.
     """
     before, after = diagnosis.gap.nominal, diagnosis.gap.explained or diagnosis.gap.refit
     if before is None or after is None:
         return before is None
     pairs = [
-        (before.nrmse_position, after.nrmse_position),
+        (diagnosis.missed(before), diagnosis.missed(after)),
         (before.chi2_per_dof, after.chi2_per_dof),
     ]
     known = [(old, new) for old, new in pairs if old is not None and new is not None]

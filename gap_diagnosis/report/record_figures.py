@@ -41,7 +41,8 @@ def draw_bands(found: Sequence[RecordComparison], *, known: bool) -> Figure:
     grid = figure.add_gridspec(
         rows, 1, left=0.1, right=0.74, bottom=0.44 / tall, top=1 - 0.32 / tall, hspace=0.25
     )
-    figure.text(0.1, 1 - 0.14 / tall, "Error of the position by band", va="center", fontsize=11)
+    what = {"motion": "position", "torque": "torque"}[found[0].compared]
+    figure.text(0.1, 1 - 0.14 / tall, f"Error of the {what} by band", va="center", fontsize=11)
     axes = [figure.add_subplot(grid[row]) for row in range(rows)]
     for axis, level in zip(axes, found, strict=True):
         for order, (name, errors) in enumerate(level.errors.items()):
@@ -54,7 +55,7 @@ def draw_bands(found: Sequence[RecordComparison], *, known: bool) -> Figure:
         log_values(axis)
         ends = level.edges_hz
         axis.set_xticks(range(ends.size - 1), [f"to {two_digits(end)}" for end in ends[1:]])
-        axis.set_ylabel(f"level {level.level}: error / {SIGMA if known else 'motion'}")
+        axis.set_ylabel(f"level {level.level}: error / {SIGMA if known else level.compared}")
     axes[-1].set_xlabel("band (Hz)", labelpad=1)
     legend(axes[0], *axes[1:])
     return figure

@@ -33,7 +33,12 @@ def record_level_plots(found: RecordComparison, noise_known: bool) -> dict[str, 
 
 
 def _time(found: RecordComparison) -> Plot:
-    """Return y of rig and models, and what each model misses of y and of u."""
+    """Return y of rig and models, and what each model misses of y and of u.
+
+    Where torques were compared, those of rig and models, what each misses, and y of the rig.
+    """
+    if found.compared == "torque":
+        return _torque_over_time(found)
     t, traces = found.time_s, []
     line: Options = {"dash": "solid", "width": 1.0, "at": SECONDS}
     x, y = extremes(t, found.position["rig"])
@@ -51,13 +56,32 @@ def _time(found: RecordComparison) -> Plot:
     return {"data": traces, "layout": stack(titles, [1.0, 1.0, 1.0], "time (s)")}
 
 
+def _torque_over_time(found: RecordComparison) -> Plot:
+    t, traces = found.time_s, []
+    line: Options = {"dash": "solid", "width": 1.0, "at": SECONDS}
+    x, y = extremes(t, found.torque["rig"])
+    traces.append(trace(x, y, "rig", "--ink", **line, unit="N m"))
+    for name, (label, color, dash) in MODEL_STYLES.items():
+        if name in found.torque:
+            x, y = extremes(t, found.torque[name])
+            traces.append(trace(x, y, label, color, **(line | {"dash": dash}), unit="N m"))
+            x, y = extremes(t, found.torque[name] - found.torque["rig"])
+            below: Options = line | {"row": 2, "showlegend": False}
+            traces.append(trace(x, y, label, color, **below, unit="N m"))
+    x, y = extremes(t, found.position["rig"])
+    lowest: Options = line | {"row": 3, "showlegend": False}
+    traces.append(trace(x, y, "rig", "--ink", **lowest, unit="rad"))
+    titles = ["u (N m)", f"u, model {_MINUS} rig (N m)", "y (rad)"]
+    return {"data": traces, "layout": stack(titles, [1.0, 1.0, 1.0], "time, mean (s)")}
+
+
 def _bands(found: RecordComparison, noise_known: bool) -> Plot:
     """Return the rms error in each band after each step."""
     edges = found.edges_hz
     names = ["0 to " + two_digits(edges[1])]
     names += [f"{two_digits(a)} to {two_digits(b)}" for a, b in pairwise(edges[1:])]
     at = np.arange(len(names), dtype=float)
-    unit = _SIGMA if noise_known else "of the motion"
+    unit = _SIGMA if noise_known else f"of the {found.compared}"
     traces = []
     for order, (name, errors) in enumerate(found.errors.items()):
         label = {"nominal": "nominal", "refit": "refit"}.get(name, f"+ {explanation([name])}")
@@ -69,7 +93,7 @@ def _bands(found: RecordComparison, noise_known: bool) -> Plot:
     if noise_known:
         ends = [-0.4, len(names) - 0.6]
         traces.append(trace(ends, [1.0, 1.0], "noise", "--noise", dash="dash", hoverinfo="skip"))
-    title = f"rms error / noise ({_SIGMA})" if noise_known else "rms error / rms motion of the band"
+    title = f"rms error / noise ({_SIGMA})" if noise_known else f"rms error / rms {found.compared}"
     axes = layout("band (Hz)", title)
     axes["yaxis"] |= {"type": "log", "tickformat": "~g", "dtick": 1}
     axes["xaxis"] |= {

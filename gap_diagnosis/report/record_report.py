@@ -9,6 +9,7 @@ from fjr_kit.page import render_page
 
 from ..how_far.record_comparison import RecordComparison, compare_records
 from ..model.simulated_rig import Model
+from ..outcome.cause_words import TORQUE
 from ..record_investigation import RecordInvestigation
 from .gap_tables import parameters, tried
 from .outcome_values import origin, outcome_plots, outcome_values
@@ -60,6 +61,7 @@ def render_record_report(
         **outcome_values(diagnosis),
         levels=[f"Level {one.level}, {one.name}" for one in found],
         noise_known=known,
+        compared={"motion": "position", "torque": "torque"}[diagnosis.compared],
         tried=tried(diagnosis),
         parameters=parameters(best.space, diagnosis, investigation.nominal.plant),
         method=_method(investigation),
@@ -72,14 +74,22 @@ def _lead(investigation: RecordInvestigation) -> str:
     """Return what was recorded, in a sentence."""
     records = investigation.evidence.records
     count, levels = len(records.records), len(records.levels)
-    total = sum(r.samples for r in records.records) / records.sample_rate_hz
+    samples = sum(r.samples for r in records.records)
+    total = samples / records.sample_rate_hz
+    kept = (
+        f"averaged over {samples} equal ways"
+        if investigation.evidence.slow
+        else f"{records.sample_rate_hz:g} Hz"
+    )
     return (
         f"{count} record{'s' if count > 1 else ''} of {levels} level{'s' if levels > 1 else ''}, "
-        f"{total:.3g} s in all, {records.sample_rate_hz:g} Hz."
+        f"{total:.3g} s in all, {kept}."
     )
 
 
 def _method(investigation: RecordInvestigation) -> str:
+    if investigation.evidence.slow:
+        return TORQUE
     simulator = investigation.evidence.simulator
     laws = simulator.loop.laws
     loop = "The closed loop is simulated from the true start of each record."

@@ -24,13 +24,15 @@ def updated_values(
     """Return the parameters of the better simulation by node.
 
     Simulator: refitted base parameters and all named effects, without encoder noise. Controller and
-    sample rate: the recorded ones. Excitation, for steady periods only: grid, levels and periods of
-    the record, so that a campaign plays the same kind of signal, with phases of its own.
+    sample rate: the recorded ones; no rate where the rig was recorded too slowly to be simulated.
+    Excitation, for steady periods only: grid, levels and periods of the record, so that a campaign
+    plays the same kind of signal, with phases of its own.
     """
     rate = _rate(recorded)
     simulator = simulator_values({name: float(e.value) for name, e in diagnosis.parameters.items()})
     SIMULATOR.check(simulator, "updated.yaml")
-    values: dict[str, dict[str, Any]] = {"simulator": {"sample_rate_hz": rate, **simulator}}
+    played = {"sample_rate_hz": rate} if diagnosis.compared == "motion" else {}
+    values: dict[str, dict[str, Any]] = {"simulator": {**played, **simulator}}
     if isinstance(recorded, RecordedExperiment):
         values["excitation"] = {"sample_rate_hz": rate, **_excitation(recorded)}
     if has_known_law(recorded):

@@ -23,6 +23,10 @@ _COLORS = {"whole": "--muted", "less": "--excited", "more": "--odd", "left": "--
 _INKS = {"whole": "#A8ADB5", "less": EXCITED, "more": ODD, "left": EVEN, "noise": NOISE}
 _NAMES = {"whole": "nominal", "less": "closed", "more": "opened", "left": "remainder",
           "noise": "noise"}  # fmt: skip
+_AXIS = {
+    "motion": "rms error of the position, % of its rms",
+    "torque": "rms error of the torque, % of its rms",
+}
 _ROOM = {"t": 36, "r": 76}  # px; a label may begin where the longest bar ends
 _LOWEST = 0.5  # of the least gap: where bars begin on a logarithmic axis
 
@@ -34,7 +38,7 @@ class Bar:
     Attributes:
         name: what stands beside it.
         kind: what it shows.
-        start, end: rms error of the position, % of the rms motion; what floats does not start at 0.
+        start, end: rms error of what was compared, % of its rms; what floats does not start at 0.
     """
 
     name: str
@@ -57,9 +61,10 @@ def bars(diagnosis: Diagnosis) -> list[Bar]:
     found: list[Bar] = []
     before: float | None = None
     for step in diagnosis.steps:
-        if step.nrmse_position is None or not known(step.nrmse_position):
+        missed = diagnosis.missed(step)
+        if missed is None or not known(missed):
             continue
-        after = 100.0 * step.nrmse_position
+        after = 100.0 * missed
         name = {"nominal": "nominal", "refit": "refit"}.get(step.stage, "")
         name = name or f"+ {explanation([step.added or ''])}"
         if before is None:
@@ -70,9 +75,9 @@ def bars(diagnosis: Diagnosis) -> list[Bar]:
     if before is None:
         return []
     found.append(Bar("remainder", "left", 0.0, before))
-    floor = diagnosis.gap.noise_floor
-    if floor is not None and known(floor.nrmse_position):
-        found.append(Bar("noise", "noise", 0.0, 100.0 * (floor.nrmse_position or 0.0)))
+    noise = diagnosis.missed(diagnosis.gap.noise_floor)
+    if known(noise):
+        found.append(Bar("noise", "noise", 0.0, 100.0 * (noise or 0.0)))
     return found
 
 
@@ -108,7 +113,7 @@ def waterfall_plot(diagnosis: Diagnosis) -> Plot | None:
             "marker": {"color": color},
             "hovertemplate": "%{text}<extra>%{fullData.name}</extra>",
         })  # fmt: skip
-    axes = layout("rms error of the position, % of its rms", "", log_x=lowest > 0.0)
+    axes = layout(_AXIS[diagnosis.compared], "", log_x=lowest > 0.0)
     greatest = max(LEAST_PERCENT, *(max(bar.start, bar.end) for bar in shown))
     if lowest:
         axes["xaxis"]["range"] = [math.log10(lowest), math.log10(2.5 * greatest)]
@@ -152,5 +157,5 @@ def draw_waterfall(diagnosis: Diagnosis) -> Figure:
     axis.grid(False, axis="y")
     axis.invert_yaxis()
     axis.margins(x=0.12)
-    axis.set_xlabel("rms error of the position, % of its rms", labelpad=1)
+    axis.set_xlabel(_AXIS[diagnosis.compared], labelpad=1)
     return figure

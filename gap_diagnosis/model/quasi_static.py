@@ -1,0 +1,173 @@
+"""Records so slow that inertia moves nothing: their torque over the angle is the evidence.
+
+A position that is held step after step, or a sweep that takes minutes, is often recorded at a rate
+at which no motion of the rig could be followed. Nothing is lost by that: what the torque must
+overcome is known from angle, direction and speed alone. So no motion is played; the torque that a
+model needs along the recorded motion is compared with the recorded one (inverse dynamics without
+inertia). Each run is averaged over equal ways first, its **stations**: rest counts no more than
+motion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+
+from fjr_records.records import Record, RecordSet
+from fjr_sim_node.plant.statics import torque_along
+
+from .record_loop import RecordLoop
+from .simulated_rig import Model
+
+NOTE = (
+    "Of motion as slow as this only what acts at rest or in slow motion can be seen: friction, "
+    "gravity, springs, ripples over the angle, a constant torque."
+)
+
+_INERTIA_SHARE = 0.05  # greatest share of the rms torque that inertia may take
+_SMOOTH_S = 0.01  # over which a position is averaged before it is differentiated
+_STATIONS = 4000  # of all runs together
+_FEWEST = 256
+_JITTER, _LEAST_MOVE = 3.0, 1e-4  # times the median move, times the range: less is no travel
+
+
+@dataclass(frozen=True)
+class Stations:
+    """Slow runs, averaged over equal ways.
+
+    Attributes:
+        records: their angle and torque, a sample for each station.
+        speeds: of each run, float64 (stations,), rad/s.
+        directions: of travel, likewise: 1 or -1.
+    """
+
+    records: RecordSet
+    speeds: tuple[np.ndarray, ...]
+    directions: tuple[np.ndarray, ...]
+
+
+def stations(records: RecordSet, nominal: Mapping[str, float]) -> Stations | None:
+    """Return the stations of records; None where inertia counts, or too little is travelled.
+
+    Args:
+        records: the runs.
+        nominal: datasheet values by the names of PLANT.
+    """
+    plant = Model.nominal(nominal).plant
+    inertia = plant["jm"] + plant.get("j", 0.0)
+    rate, runs = records.sample_rate_hz, records.records
+    if any(_inertia_share(r, rate, inertia) > _INERTIA_SHARE for r in runs):
+        return None
+    travels = [_travel(r.position) for r in runs]
+    length = sum(float(np.abs(moves).sum()) for moves, _ in travels) / _STATIONS
+    if not length > 0.0:
+        return None
+    found = [_averaged(r, *t, length, rate) for r, t in zip(runs, travels, strict=True)]
+    if min(record.samples for record, *_ in found) < _FEWEST:
+        return None
+    made, speeds, directions = zip(*found, strict=True)
+    seconds = sum(r.samples for r in runs) / rate
+    slow = sum(record.samples for record in made) / seconds
+    return Stations(replace(records, sample_rate_hz=slow, records=made), speeds, directions)
+
+
+def _inertia_share(record: Record, rate: float, inertia: float) -> float:
+    """Return the rms torque that inertia takes over the recorded rms torque."""
+    smooth = max(round(_SMOOTH_S * rate), 1)
+    position = uniform_filter1d(uniform_filter1d(record.position, smooth), smooth)
+    acceleration = np.diff(position, 2) * rate**2
+    whole = float(np.sqrt(np.mean(record.torque**2)))
+    return inertia * float(np.sqrt(np.mean(acceleration**2))) / max(whole, 1e-300)
+
+
+def _travel(position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the move at each sample (rad), and the direction of the last: 0 before any move.
+
+    A move counts once it leaves a play whose width is that of what is no travel.
+    """
+    width = max(
+        _JITTER * float(np.median(np.abs(np.diff(position)))),
+        _LEAST_MOVE * float(np.ptp(position)),
+    )
+    followed, at = np.empty(position.size), float(position[0])
+    for k, place in enumerate(position.tolist()):
+        at = min(max(at, place - width), place + width)
+        followed[k] = at
+    moves = np.diff(followed, prepend=followed[0])
+    last = np.maximum.accumulate(np.where(moves != 0.0, np.arange(moves.size), -1))
+    direction = np.where(last >= 0, np.sign(moves[last]), 0.0)
+    return moves, direction
+
+
+def _averaged(
+    record: Record, moves: np.ndarray, direction: np.ndarray, length: float, rate: float
+) -> tuple[Record, np.ndarray, np.ndarray]:
+    """Return a run averaged over ways of a length, with the speed and direction of each."""
+    moving = direction != 0.0
+    place = (np.cumsum(np.abs(moves)) / length).astype(int)[moving]
+    direction = direction[moving]
+    changes = (np.diff(place) != 0) | (np.diff(direction) != 0.0)
+    station = np.concatenate([[0], np.cumsum(changes)]) if place.size else place
+    count = np.maximum(np.bincount(station), 1)
+
+    def mean(values: np.ndarray) -> np.ndarray:
+        return np.bincount(station, values) / count
+
+    averaged = replace(
+        record, reference=None, link=None, torque=mean(record.torque[moving]),
+        position=mean(record.position[moving]),
+        description=record.description.model_copy(update={"controller": None}),
+    )  # fmt: skip
+    return averaged, mean(moves[moving]) * rate, mean(direction)
+
+
+class QuasiStaticSimulator:
+    """Answers as `RecordSimulator` does, for stations: by torque alone, in units of the motion.
+
+    The rig is held to the recorded angle by a stiffness of as much torque as there is, for as much
+    motion as there is; so a share of the torque that a model lacks is the same share of the motion.
+
+    Attributes:
+        loop: of no run known.
+        crossover_hz: up to which the torque is known along the motion.
+    """
+
+    def __init__(self, found: Stations) -> None:
+        """Take the stations."""
+        self._found, self._records = found, found.records.records
+        self.loop = RecordLoop("unknown", (None,) * len(self._records))
+        self.crossover_hz = found.records.sample_rate_hz / 8.0
+        torque, motion = (
+            np.sqrt(np.mean([np.var(signal) for signal in signals]))
+            for signals in zip(*((r.torque, r.position) for r in self._records), strict=True)
+        )
+        self._stiffness = float(torque / motion)
+
+    def response(self, frequency_hz: np.ndarray, index: int) -> np.ndarray:
+        """Return the stiffness that holds a run, at all frequencies; complex, N m/rad."""
+        return np.full(np.shape(frequency_hz), self._stiffness, complex)
+
+    def run(self, models: Sequence[Model], which: Sequence[int]) -> list[list[np.ndarray]]:
+        """Return y, u and q of each model in each run, see `RecordSimulator.run`."""
+        return [[self._run(model, index) for index in which] for model in models]
+
+    def missing_torque(self, model: Model, which: Sequence[int]) -> list[np.ndarray]:
+        """Return the torque that a model needs beyond the recorded one, N m."""
+        return [self._needed(model, i) - self._records[i].torque for i in which]
+
+    def _run(self, model: Model, index: int) -> np.ndarray:
+        record, needed = self._records[index], self._needed(model, index)
+        held = record.position - (needed - record.torque) / self._stiffness
+        return np.array([held, needed, held])
+
+    def _needed(self, model: Model, index: int) -> np.ndarray:
+        angle = self._records[index].position
+        torque = np.empty(angle.size)
+        torque_along(
+            angle, self._found.speeds[index], self._found.directions[index],
+            model.plant_coefficients, model.effect_coefficients, torque,
+        )  # fmt: skip
+        return torque

@@ -1,0 +1,135 @@
+"""Records so slow that inertia moves nothing are compared by their torque over the angle."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from controller_node import pd_filtered
+from fjr_interface.experiment import RecordDescription
+from fjr_records.records import Record, RecordSet
+from fjr_sim_node import effects as fx
+from fjr_sim_node.plant import PLANT, coefficients
+from fjr_sim_node.simulation.closed_loop import simulate
+from gap_diagnosis.any_record import investigate_any
+from gap_diagnosis.model.evidence import Evidence
+from gap_diagnosis.model.quasi_static import stations
+from gap_diagnosis.model.simulated_rig import Model
+from gap_diagnosis.record_investigation import LOST, RecordInvestigation, investigate_records
+from gap_diagnosis.report.gap_output import write_diagnosis
+
+RATE, KEPT = 1000.0, 20
+NOMINAL = {name: float(value) for name, value in PLANT.defaults().items()}
+SMOOTH = {**NOMINAL, "fs": 0.0, "fsm": 0.0}
+SPEED = 0.1
+RIPPLE = {
+    "cogging.amplitude_nm": 4.0,
+    "cogging.cycles_per_turn": 24.0,
+    "cogging.phase_rad": 0.7,
+}
+LAWS = {
+    "none": {},
+    "cogging": RIPPLE,
+    "gravity": {"gravity.torque_nm": 6.0, "gravity.angle_rad": 0.4},
+    "spring": {"external_spring.stiffness_nm_rad": 5.0, "external_spring.rest_rad": 0.3},
+    "bias": {"torque_bias.torque_nm": 2.0},
+    "position friction": {
+        "position_friction.amplitude_nm": 2.0,
+        "position_friction.cycles_per_turn": 9.0,
+    },
+    "ripple of the constant": {
+        "torque_constant_ripple.amplitude": 0.1,
+        "torque_constant_ripple.cycles_per_turn": 15.0,
+    },
+    "load friction": {"load_friction.coefficient": 0.2},
+    "asymmetry": {"asymmetric_friction.coulomb_nm": 1.5},
+    "drag": {"quadratic_friction.motor_nm_s2_rad2": 200.0},
+}
+
+
+def slow_record(effects, *, plant=NOMINAL, speed=SPEED, turns=0.5, every=KEPT) -> RecordSet:
+    """Return slow sweeps to and fro, at two speeds, that a loop held; sampled slowly."""
+    samples = int(RATE * 2.0 * np.pi * turns / speed)
+    there = speed / RATE * np.arange(samples)
+    slowly = 0.5 * speed / RATE * np.arange(2 * samples)
+    reference = np.concatenate([there, there[::-1], slowly, slowly[::-1]])
+    law = pd_filtered.CONTROLLER.check({"sample_rate_hz": RATE, "p": 3000.0, "d": 150.0})
+    run = simulate(
+        reference, RATE, coefficients(plant), pd_filtered.coefficients(law),
+        1e-6 * np.random.default_rng(3).standard_normal(reference.size), fx.coefficients(effects),
+    )  # fmt: skip
+    kept = slice(0, None, every)
+    description = RecordDescription.of(
+        "test", sample_rate_hz=RATE / every, level=0, levels=1, realization=0, realizations=1
+    )
+    record = Record("sweep", description, None, run.torque[kept], run.position[kept], None)
+    return RecordSet("test", RATE / every, (record,))
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_the_torque_along_a_slow_motion_is_that_of_the_simulated_rig(name):
+    found = stations(slow_record(LAWS[name]), NOMINAL)
+    simulator = Evidence(found.records, NOMINAL, found).simulator
+    (missing,) = simulator.missing_torque(Model(NOMINAL, LAWS[name]), [0])
+    torque = np.std(found.records.records[0].torque)
+    assert np.quantile(np.abs(missing), 0.97) < 0.04 * torque  # not where it turns round
+    if LAWS[name]:
+        (bare,) = simulator.missing_torque(Model(NOMINAL, {}), [0])
+        assert np.quantile(np.abs(bare), 0.97) > 0.08 * torque
+
+
+@pytest.fixture(scope="module")
+def found() -> RecordInvestigation:
+    return investigate_any(slow_record(RIPPLE), SMOOTH)
+
+
+def test_cogging_and_the_friction_that_a_datasheet_lacks_are_named(found):
+    diagnosis = found.diagnosis
+    assert {"cogging", "coulomb_friction"} == set(diagnosis.effects)
+    sizes = diagnosis.parameters
+    assert sizes["cogging.cycles_per_turn"].value == pytest.approx(24.0, abs=0.1)
+    assert sizes["cogging.amplitude_nm"].value == pytest.approx(4.0, rel=0.03)
+    friction = [sizes[f"coulomb_friction.{side}_nm"].value for side in ("motor", "link")]
+    assert sum(friction) == pytest.approx(NOMINAL["fs"] + NOMINAL["fsm"], rel=0.03)
+
+
+def test_it_says_that_torques_were_compared(found, tmp_path):
+    diagnosis = found.diagnosis
+    assert diagnosis.compared == "torque" and diagnosis.steps[-1].nrmse_position is None
+    assert diagnosis.steps[-1].nrmse_torque < 0.1 < diagnosis.steps[0].nrmse_torque
+    page = write_diagnosis(found, tmp_path).read_text(encoding="utf-8")
+    assert "no motion was simulated" in page and "rms error of the torque" in page
+    assert "sample_rate_hz" not in (tmp_path / "updated.yaml").read_text(encoding="utf-8")
+
+
+def test_a_known_loop_is_played_first(found):
+    assert found.evidence.slow
+    records = slow_record(RIPPLE, every=1, turns=0.1)
+    law = pd_filtered.CONTROLLER.check({"sample_rate_hz": RATE, "p": 3000.0, "d": 150.0})
+    (record,) = records.records
+    description = record.description.model_copy(
+        update={"controller": pd_filtered.describe(law), "sample_rate_hz": RATE}
+    )
+    reference = record.position + record.torque / 3000.0
+    known = replace(record, description=description, reference=reference)
+    told: list[str] = []
+    investigate_any(
+        replace(records, records=(known,)), NOMINAL, effects=("cogging",), progress=told.append
+    )
+    assert told[0] == "windows and noise"
+
+
+def test_what_inertia_moves_is_no_slow_motion():
+    assert stations(slow_record({}), NOMINAL) is not None
+    assert stations(slow_record({}, speed=20.0, every=1, turns=20.0), NOMINAL) is None
+
+
+def test_a_model_that_misses_more_than_the_motion_names_nothing(monkeypatch):
+    monkeypatch.setattr("gap_diagnosis.record_investigation._follows", lambda *_: False)
+    records = slow_record(RIPPLE)
+    slow = stations(records, SMOOTH)
+    diagnosis = investigate_records(records, SMOOTH, slow=slow).diagnosis
+    assert diagnosis.verdict == "unexplained" and not diagnosis.causes
+    assert LOST in diagnosis.notes
