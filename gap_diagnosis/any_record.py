@@ -8,6 +8,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from fjr_interface.bags.reader import DEFAULT, BagReader, SignalMap, find_bags
 from fjr_interface.experiment import RecordDescription
 from fjr_interface.resampling.accuracy import Resampling
@@ -18,8 +20,10 @@ from fjr_records.records import RecordSet, read_records, reference_optional
 
 from . import second_look
 from .drift_gate import drift_gate
+from .gates.gate_checks import DISCRETISATION_LIMIT
 from .investigation import Investigation, investigate
 from .judgement import stopped
+from .model.discretisation import discretisation_error
 from .model.nominal import datasheet
 from .model.quasi_static import Stations, stations
 from .model.simulated_rig import Model
@@ -178,6 +182,9 @@ def _look(
             recorded, nominal, tolerance=tolerance, effects=effects,
             budget_s=STEADY_SHARE * budget_s, progress=progress,
         )  # fmt: skip
+        if steady.gates.only_by_nominal:
+            left = max(budget_s - (time.monotonic() - begun), 0.0)
+            return _swinging(recorded, nominal, tolerance, effects, left, progress) or steady
         unsteady = steady.gates.only_unsteady
         untested = bool(steady.diagnosis.effects) and steady.diagnosis.reported_on == "none"
         if steady.diagnosis.verdict != "unexplained" and not unsteady and not untested:
@@ -192,6 +199,30 @@ def _look(
             return _drifting(steady, whole)
         return _beside(whole, steady, UNSTEADY if unsteady else UNTESTED if untested else BESIDE)
     return _of_records(recorded, nominal, tolerance, effects, budget_s, progress)
+
+
+def _swinging(
+    recorded: RecordedExperiment,
+    nominal: Mapping[str, float],
+    tolerance: float,
+    effects: Sequence[str] | None,
+    budget_s: float,
+    progress: Progress,
+) -> RecordInvestigation | None:
+    """Diagnose whole runs whose loop, by the datasheet alone, cannot be simulated well.
+
+    A loop that is damped by a friction which the datasheet lacks is one: it rings, or swings so
+    that the recorded torque must drive the model. None where nothing is found, or where the loop
+    with what was found cannot be simulated any better.
+    """
+    whole = investigate_records(
+        recorded.as_records(), nominal, tolerance=tolerance, effects=effects, budget_s=budget_s,
+        progress=progress,
+    )  # fmt: skip
+    if not whole.diagnosis.causes:
+        return None
+    error = discretisation_error(recorded, whole.found.best.model)
+    return whole if np.max(error) <= DISCRETISATION_LIMIT else None
 
 
 def _of_records(

@@ -148,14 +148,15 @@ def _refitted(
 ) -> tuple[CellFitter, CellFit, list[str]]:
     """Return the fit of the base parameters, with a torque that acts as unseen parts call for.
 
-    Where no loop makes it, the recorded torque drives the model: held, unless it does clearly
-    better as a signal. Both may come late, so that half a sample of delay decides nothing.
+    Where no loop makes it, the recorded torque drives the model: held, unless it is no command and
+    does clearly better as a signal. Both may come late, so that half a sample of delay decides
+    nothing.
     """
     plant = Model.nominal(nominal).plant
     progress("refit of the base parameters")
     fitter = CellFitter(Evidence(records, nominal), plant, tolerance)
     refit, loop = fitter.refit(), fitter.evidence.simulator.loop
-    if None not in loop.laws:
+    if None not in loop.laws or loop.commanded:
         return fitter, refit, []
     progress("refit with a torque that is not held")
     flowing = with_continuous_torque(records, loop)

@@ -29,6 +29,7 @@ REFERENCE_LIMIT = 1e-4
 """Greatest difference of the reference between periods, relative rms."""
 DISCRETISATION_LIMIT = 1e-3
 """Greatest error of the simulation itself, relative to y."""
+_DISCRETISATION = "discretisation"
 UNSTABLE = 0.1
 """Such an error is that of a loop in which small differences grow, not of the integration."""
 
@@ -79,6 +80,11 @@ class GateReport:
     def only_unsteady(self) -> bool:
         """Whether nothing is wrong but that periods do not repeat."""
         return bool(self.failures) and all(gate.of_periods for gate in self.failures)
+
+    @property
+    def only_by_nominal(self) -> bool:
+        """Whether nothing is wrong but that the nominal loop cannot be simulated well."""
+        return [gate.name for gate in self.failures] == [_DISCRETISATION]
 
 
 def check_gates(
@@ -282,4 +288,4 @@ def _discretisation(recorded: RecordedExperiment, nominal: Model) -> Gate:
         else f"the simulation's own discretisation error is {value:.2g} of y; record at a higher "
         "sample_rate_hz or a lower amplitude."
     )
-    return _gate("discretisation", value, DISCRETISATION_LIMIT, sentence, passed)
+    return _gate(_DISCRETISATION, value, DISCRETISATION_LIMIT, sentence, passed)

@@ -40,11 +40,14 @@ class RecordLoop:
         kind: whether it can be simulated in any of them, with gains that were known or solved for.
         laws: the law of each record; None where it is not known, or does not make the torque.
         notes: sentences on what was found.
+        commanded: whether a described controller makes the torque of all of them: then it is a
+            command, held from sample to sample, also where it drives the model.
     """
 
     kind: Loop
     laws: tuple[TransferFunction | None, ...]
     notes: tuple[str, ...] = ()
+    commanded: bool = False
 
 
 def loop_of(records: RecordSet) -> RecordLoop:
@@ -83,7 +86,7 @@ def loop_of(records: RecordSet) -> RecordLoop:
         )
     kind: Loop = "unknown" if not follow else "gains_fitted" if gains else "known"
     chosen = tuple(laws[r.name] if r.name in follow else None for r in runs)
-    return RecordLoop(kind, chosen, tuple(notes))
+    return RecordLoop(kind, chosen, tuple(notes), len(follow) == len(runs))
 
 
 def without_erratic(loop: RecordLoop, names: Sequence[str], growth: Sequence[float]) -> RecordLoop:

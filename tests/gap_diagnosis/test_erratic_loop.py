@@ -6,12 +6,15 @@ import math
 
 import numpy as np
 import pytest
+from gap_cases import SHORT, simulate_case
 
 from controller_node.law import as_transfer_function, law_of
 from fjr_interface.experiment import RecordDescription
 from fjr_records.records import Record, RecordSet
-from fjr_sim_node.plant import coefficients
+from fjr_sim_node import effects as fx
+from fjr_sim_node.plant import PLANT, coefficients
 from fjr_sim_node.simulation.closed_loop import simulate_law
+from gap_diagnosis.any_record import investigate_any
 from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.record_investigation import investigate_records
 
@@ -28,6 +31,8 @@ CASCADE = {
     "k_velocity": 8500.0,
     "torque_limit_nm": 350.0,
 }
+FRICTION = ("fs", "fsm", "fv", "fvm")
+ADDED = ("coulomb_friction", "viscous_friction")
 KNOWN = ("coulomb_friction", "viscous_friction", "delay", "extra_mode", "torque_bias")
 
 
@@ -79,3 +84,23 @@ def test_a_loop_that_swings_without_end_is_not_simulated_and_friction_is_found()
 def test_a_loop_that_follows_is_simulated():
     loop = Evidence(recorded(1.0), BARE).simulator.loop
     assert loop.kind == "known" and None not in loop.laws
+
+
+@pytest.mark.parametrize("p", [600.0, 800.0])
+def test_steady_periods_of_a_loop_that_swings_without_the_missing_friction_are_no_bad_data(p):
+    """Where the loop rings, or its torque must drive the model, which is a command and held."""
+    smooth = {**PLANT.defaults(), **dict.fromkeys(FRICTION, 0.0)}
+    case = simulate_case({}, seed=5, controller={"p": p, "d": 60.0, "n": 24.0}, **SHORT)
+    looked_for = (*ADDED, "delay", "actuator_lag")
+    found = investigate_any(case.recorded, smooth, effects=looked_for).diagnosis
+    assert sorted(found.effects) == sorted(ADDED)
+    sizes = {fx.parameter(n).adds_to: e.value for n, e in found.parameters.items() if "." in n}
+    assert sizes == pytest.approx({name: case.rig[name] for name in FRICTION}, rel=0.01)
+
+
+def test_what_cannot_be_simulated_with_its_causes_either_stays_bad_data(monkeypatch):
+    monkeypatch.setattr("gap_diagnosis.any_record.discretisation_error", lambda *_: np.ones(1))
+    smooth = {**PLANT.defaults(), **dict.fromkeys(FRICTION, 0.0)}
+    case = simulate_case({}, seed=5, controller={"p": 600.0, "d": 60.0, "n": 24.0}, **SHORT)
+    found = investigate_any(case.recorded, smooth, effects=ADDED).diagnosis
+    assert found.verdict == "bad_data" and not found.effects
