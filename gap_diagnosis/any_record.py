@@ -233,7 +233,7 @@ def _of_records(
     budget_s: float,
     progress: Progress,
 ) -> RecordInvestigation:
-    """Diagnose records as they came, slow ones by their torque alone as far as that goes.
+    """Diagnose records as they came, slow ones by their torque alone.
 
     A loop that is known is played all the same, and first: it shows more than torques do.
     """
@@ -246,14 +246,14 @@ def _of_records(
         )  # fmt: skip
 
     slow = stations(records, nominal)
-    if slow is None:
-        return look(None)
     known = any(r.controller and r.reference is not None for r in records.records)
-    first = look(None if known else slow)
-    if first.diagnosis.causes:
-        return first
-    second = look(slow if known else None)
-    return second if second.diagnosis.causes or not known else first
+    if slow is not None and not known:
+        return look(slow)
+    played = look(None)
+    if slow is None or played.diagnosis.causes:
+        return played
+    still = look(slow)
+    return still if still.diagnosis.causes else played
 
 
 def _drifting(steady: Investigation, whole: RecordInvestigation) -> Investigation:

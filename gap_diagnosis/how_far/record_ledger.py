@@ -25,13 +25,21 @@ class Ledger:
         self.parts = tuple(evidence.reporting if parts is None else parts)
         self.runs = sorted({evidence.parts[p].record for p in self.parts})
         self._part = evidence.part_of(self.parts)
-        energy = {
-            i: max(float(np.mean((r.position - r.position.mean()) ** 2)), 1e-300)
-            for i, r in enumerate(evidence.records.records)
-        }
+        energy = [self._energy(i) for i in range(len(evidence.records.records))]
         of_part = np.array([energy[part.record] for part in evidence.parts])
         self._scale = of_part[self._part] * evidence.hop
         self._floor = evidence.floor(self.parts)[evidence.cell_of(self.parts)]
+
+    def _energy(self, index: int) -> float:
+        """Return the mean square of what is compared of a run (rad^2), of a motion about its mean.
+
+        A constant torque is a torque.
+        """
+        record = self.evidence.records.records[index]
+        if not self.evidence.slow:
+            return max(float(np.var(record.position)), 1e-300)
+        held = np.abs(self.evidence.simulator.response(np.zeros(1), index))
+        return max(float(np.mean(record.torque**2) / held[0] ** 2), 1e-300)
 
     def squares(self, model: Model) -> np.ndarray:
         """Return the squared error over the squared motion of each part, (parts,)."""

@@ -36,6 +36,8 @@ _PURPOSES: tuple[Purpose, ...] = ("fit", "select", "report")
 _CYCLE: tuple[Purpose, ...] = ("fit", "select", "fit", "report")
 """Purposes of the blocks of a level's only record, shifted from level to level: what one time of
 the record shows serves all purposes."""
+_SLOW_WINDOWS = 96
+_SLIGHT = 0.01  # of the torque: in a slow motion, less of it says nothing
 _SIMULATION = 1e-3  # error of the simulation itself, of its torque or of its motion
 _DIVERGED = 1e6
 
@@ -90,9 +92,10 @@ class Evidence:
         levels = [r.level for r in records.records]
         alone = any(levels.count(level) == 1 for level in levels)
         windows = 2 * WINDOWS if alone else WINDOWS
-        hop = shortest / (windows + 1)
         if slow is None:
-            hop = min(hop, 0.5 * _LONGEST_WINDOW_S * rate)
+            hop = min(shortest / (windows + 1), 0.5 * _LONGEST_WINDOW_S * rate)
+        else:
+            hop = shortest / (_SLOW_WINDOWS + 1)
         self.hop = max(int(hop - hop % (16 if hop >= _LONG else 2)), 8)
         self._measured = [lapped(r.position, self.hop) for r in records.records]
         self.simulator: RecordSimulator | QuasiStaticSimulator
@@ -238,6 +241,9 @@ class Evidence:
         where a stiff loop moves far and slowly.
         """
         noise = self.noise.std_rad**2 if self.noise.known else 0.0
+        if self.slow:
+            every = np.concatenate([np.ravel(lines) for lines in self._held])
+            return np.full(self.cells, _SLIGHT**2 * np.mean(every**2) + 1e-30)
         moved, held = (
             self.mean_squares(self._on_parts(lines, which), which)
             for lines in (self._measured, self._held)

@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
+from fjr_records.record_noise import record_noise
 from fjr_records.records import Record, RecordSet
 from fjr_sim_node.plant.statics import torque_along
 
@@ -27,8 +28,11 @@ NOTE = (
     "gravity, springs, ripples over the angle, a constant torque."
 )
 
-_INERTIA_SHARE = 0.05  # greatest share of the rms torque that inertia may take
-_SMOOTH_S = 0.01  # over which a position is averaged before it is differentiated
+_INERTIA_SHARE = 0.05  # of the rms torque: the most that inertia may take,
+_QUICK = 0.1  # but for such a part of the time: a sweep turns round
+_NOISE_SHARE = 0.2  # of that torque: what noise alone may feign once the position is averaged,
+_LONGEST_S = 0.2  # over no longer than that,
+_HIDDEN = 0.3  # and no longer than leaves out this much of the torque: inertia may take that
 _STATIONS = 4000  # of all runs together
 _FEWEST = 256
 _JITTER, _LEAST_MOVE = 3.0, 1e-4  # times the median move, times the range: less is no travel
@@ -59,7 +63,9 @@ def stations(records: RecordSet, nominal: Mapping[str, float]) -> Stations | Non
     plant = Model.nominal(nominal).plant
     inertia = plant["jm"] + plant.get("j", 0.0)
     rate, runs = records.sample_rate_hz, records.records
-    if any(_inertia_share(r, rate, inertia) > _INERTIA_SHARE for r in runs):
+    noise = record_noise(records)
+    noise_rad = noise.std_rad if noise.known else 0.0
+    if any(_inertia_share(r, rate, inertia, noise_rad) > _INERTIA_SHARE for r in runs):
         return None
     travels = [_travel(r.position) for r in runs]
     length = sum(float(np.abs(moves).sum()) for moves, _ in travels) / _STATIONS
@@ -74,13 +80,26 @@ def stations(records: RecordSet, nominal: Mapping[str, float]) -> Stations | Non
     return Stations(replace(records, sample_rate_hz=slow, records=made), speeds, directions)
 
 
-def _inertia_share(record: Record, rate: float, inertia: float) -> float:
-    """Return the rms torque that inertia takes over the recorded rms torque."""
-    smooth = max(round(_SMOOTH_S * rate), 1)
-    position = uniform_filter1d(uniform_filter1d(record.position, smooth), smooth)
-    acceleration = np.diff(position, 2) * rate**2
-    whole = float(np.sqrt(np.mean(record.torque**2)))
-    return inertia * float(np.sqrt(np.mean(acceleration**2))) / max(whole, 1e-300)
+def _inertia_share(record: Record, rate: float, inertia: float, noise_rad: float) -> float:
+    """Return the torque that inertia takes nearly all the time, over the recorded rms torque.
+
+    The position is averaged over as many samples as noise calls for, which feigns motion. Torque
+    that is quicker than that may move the inertia unseen.
+    """
+    whole = max(float(np.sqrt(np.mean(record.torque**2))), 1e-300)
+    for samples in range(1, max(int(_LONGEST_S * rate), 1) + 1):
+        # white noise, averaged twice, in the second difference
+        feigned = noise_rad * rate**2 * (np.sqrt(6.0) if samples == 1 else 2.0 / samples**2)
+        if inertia * feigned <= _NOISE_SHARE * _INERTIA_SHARE * whole:
+            position, torque = (
+                uniform_filter1d(uniform_filter1d(signal, samples), samples)
+                for signal in (record.position, record.torque)
+            )
+            if np.sqrt(np.mean((record.torque - torque) ** 2)) > _HIDDEN * whole:
+                break
+            acceleration = np.abs(np.diff(position, 2)) * rate**2
+            return inertia * float(np.quantile(acceleration, 1.0 - _QUICK)) / whole
+    return np.inf
 
 
 def _travel(position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -140,11 +159,9 @@ class QuasiStaticSimulator:
         self._found, self._records = found, found.records.records
         self.loop = RecordLoop("unknown", (None,) * len(self._records))
         self.crossover_hz = found.records.sample_rate_hz / 8.0
-        torque, motion = (
-            np.sqrt(np.mean([np.var(signal) for signal in signals]))
-            for signals in zip(*((r.torque, r.position) for r in self._records), strict=True)
-        )
-        self._stiffness = float(torque / motion)
+        torque = np.mean([np.mean(r.torque**2) for r in self._records])
+        motion = np.mean([np.var(r.position) for r in self._records])
+        self._stiffness = float(np.sqrt(torque / motion))
 
     def response(self, frequency_hz: np.ndarray, index: int) -> np.ndarray:
         """Return the stiffness that holds a run, at all frequencies; complex, N m/rad."""

@@ -159,7 +159,8 @@ class Step(ResultModel):
     Attributes:
         added: what was added: nothing (None) for the nominal and the refit, else the cause.
         stage: nominal, refit, or cause.
-        nrmse_position, nrmse_torque: rms error over rms about the mean.
+        nrmse_position, nrmse_torque: rms error over rms about the mean; where torques were
+            compared, over the rms of the torque.
         chi2_per_dof: mean squared error over the noise; None where noise is not known.
     """
 

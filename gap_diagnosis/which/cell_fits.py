@@ -26,7 +26,7 @@ from .least_squares import Solution, solve
 from .ripples_of_records import RecordRipples
 from .ripples_seen import SeenRipples
 from .scales import Scales
-from .screening import Proposal, Screening
+from .screening import LARGEST, LARGEST_OF_TORQUES, Proposal, Screening
 from .search_space import Space, space_for, starts
 from .unseen_friction import beside_scatter, deviated
 
@@ -126,6 +126,7 @@ class CellFitter:
             partial(self._space, parent),
             partial(self._residuals, parent.variance),
             partial(self.weights.costs, parent.variance),
+            LARGEST_OF_TORQUES if self.evidence.slow else LARGEST,
         )
 
     def from_part(self, parent: CellFit, whole: str, fit: CellFit) -> list[Proposal]:

@@ -99,12 +99,13 @@ def closed(fitter: CellFitter, after: CellFit, before: CellFit) -> float:
     """Return how much of what one fit leaves on unseen parts another closes, in one band.
 
     The band is the one in which it gains most log-likelihood: a delay shows at high frequencies,
-    where little of the motion is.
+    where little of the motion is. Of the torque of a slow motion it may be all bands together.
     """
     weights = fitter.weights
     left = [np.sum(weights.counts * fit.left, axis=0) for fit in (before, after)]
     most = int(np.argmax(weights.gained(after.left, before.left).sum(axis=0)))
-    return float(1.0 - left[1][most] / left[0][most])
+    in_band = float(1.0 - left[1][most] / left[0][most])
+    return max(in_band, 1.0 - left_of(fitter, after, before)) if fitter.evidence.slow else in_band
 
 
 def _p_value(gains: np.ndarray) -> float:

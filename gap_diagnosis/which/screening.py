@@ -24,6 +24,9 @@ from .search_space import Space, beside
 _SIZES = (0.1, 0.3, 3.0)  # of the size that the linear prediction asks for, tried after that
 _TRIED = 4
 _SCALED = 2
+LARGEST, LARGEST_OF_TORQUES = 30.0, 1000.0
+"""Times a seed: the largest size that is tried; the same where torques along a motion are compared,
+in which the size of most effects is linear."""
 _FOLLOW = 0.1  # how far a parameter of the parent may follow, relative
 
 _Base = Literal["following", "kept", "datasheet"]
@@ -62,6 +65,7 @@ class Screening:
         space_of: Callable[[Mapping[str, float]], Space],
         errors: Errors,
         costs: Costs = sums_of_squares,
+        largest: float = LARGEST,
     ) -> None:
         """Evaluate all seeds once.
 
@@ -72,12 +76,13 @@ class Screening:
             space_of: the space in which a seed is fitted.
             errors: error vectors of models, as the parent's residuals.
             costs: what error vectors cost.
+            largest: the most that a seed is scaled by.
         """
         changes = errors([beside(model, seed) for seed in seeds]) - parent.residuals
         inverse = np.linalg.pinv(parent.jacobian, rcond=1e-6)
         self._candidates = _candidates(parent, seeds, changes, inverse, costs)
         self._seeds, self._changes = seeds, changes
-        self._tries = _Tries(parent, model, inverse, space_of, errors, costs)
+        self._tries = _Tries(parent, model, inverse, space_of, errors, costs, largest)
 
     @property
     def gain(self) -> float:
@@ -127,15 +132,17 @@ class _Tries:
         space_of: Callable[[Mapping[str, float]], Space],
         errors: Errors,
         costs: Costs,
+        largest: float,
     ) -> None:
         self._parent, self._model, self._inverse = parent, model, inverse
         self._space_of, self._errors, self._costs = space_of, errors, costs
+        self._largest = largest
         self._spaces: dict[int, Space] = {}
         self._found: list[tuple[float, _Candidate, np.ndarray]] = []
 
     def run(self, tries: Sequence[tuple[_Candidate, float]], base: _Base = "following") -> None:
         """Evaluate candidates at sizes, with base parameters of some kind."""
-        tries = [(c, size) for c, size in tries if 1e-3 < abs(size) < 30.0]
+        tries = [(c, size) for c, size in tries if 1e-3 < abs(size) < self._largest]
         if not tries:
             return
         points = [self._point(candidate, size, base) for candidate, size in tries]

@@ -22,6 +22,7 @@ MOST_CAUSES = 5
 _PROPOSED, _FITTED, _STARTS = (7, 5), (5, 3), (2, 1)
 """Effects that are tried at several sizes, those of them that are fitted, and from how many starts:
 beside no cause yet, beside others."""
+_PARENTS = 3  # leading fits beside which a second cause of slow motion is looked for
 _POLISHED = 2  # leading fits of a step that are taken further
 _WORTH_A_HARMONIC = 1.3  # a misfit: what noise leaves is no second harmonic
 _AGAIN = 8  # effects without ripple that are screened beside a cause
@@ -93,15 +94,34 @@ class Stepwise:
                 found.complete = False
                 break
             fits = self._extended(found.best, found.steps[0])
-            found.rivals[len(found.best.effects) + 1] = fits
-            least = self._least_closed(found)
-            closing = [f for f in fits if closed(self._fitter, f, found.best) >= least]
-            chosen = self._chosen(closing, found.best)
+            chosen = self._repeating(fits, found)
+            if chosen is None and self._fitter.evidence.slow:
+                fits = self._pairs(fits, found.steps[0])
+                chosen = self._repeating(fits, found)
             if chosen is None:
                 break
             found.alternatives[chosen.effects[-1]] = self._tied(chosen, fits, found.best)
             found.steps.append(chosen)
         return found
+
+    def _pairs(self, fits: Sequence[CellFit], refit: CellFit) -> list[CellFit]:
+        """Return the leading fits with each promising effect more, best on unseen parts first.
+
+        Causes of slow motion may show only together: friction and gravity, say, are offsets of
+        every short way, so one alone leaves as much as it takes away.
+        """
+        pairs = [pair for fit in fits[:_PARENTS] for pair in self._extended(fit, refit)]
+        return self._ranked(pairs, refit)
+
+    def _repeating(self, fits: Sequence[CellFit], found: Found) -> CellFit | None:
+        """Return what `_chosen` takes of the fits that close enough, and keep them all."""
+        best = found.best
+        found.rivals[len(best.effects) + 1] = [
+            *found.rivals.get(len(best.effects) + 1, []), *fits
+        ]  # fmt: skip
+        least = self._least_closed(found)
+        closing = [f for f in fits if closed(self._fitter, f, best) >= least]
+        return self._chosen(closing, best)
 
     @property
     def _over(self) -> bool:
@@ -251,5 +271,5 @@ class Stepwise:
     def _tied(self, chosen: CellFit, fits: Sequence[CellFit], parent: CellFit) -> list[str]:
         """Return the effects that unseen parts cannot tell from the chosen one."""
         first = self._gain(chosen, parent).mean
-        others = [fit for fit in fits if fit is not chosen]
+        others = [f for f in fits if f is not chosen and f.effects[:-1] == chosen.effects[:-1]]
         return [f.effects[-1] for f in others if stands_for(self._gain(chosen, f), first)]

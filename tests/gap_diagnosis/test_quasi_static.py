@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.ndimage import uniform_filter1d
 
 from controller_node import pd_filtered
 from fjr_interface.experiment import RecordDescription
@@ -133,3 +134,68 @@ def test_a_model_that_misses_more_than_the_motion_names_nothing(monkeypatch):
     diagnosis = investigate_records(records, SMOOTH, slow=slow).diagnosis
     assert diagnosis.verdict == "unexplained" and not diagnosis.causes
     assert LOST in diagnosis.notes
+
+
+ROTOR = {**{name: 0.0 for name in NOMINAL}, "jm": 0.01, "k0": np.inf}
+
+
+def held_record(position, rate, law, torque_noise, resolution=0.0) -> RecordSet:
+    """Return a motion with the torque that a law asks for along it, both with noise."""
+    rng = np.random.default_rng(1)
+    velocity = uniform_filter1d(np.gradient(position) * rate, 5)
+    torque = law(position, velocity) + torque_noise * rng.standard_normal(position.size)
+    seen = position + 1e-6 * rng.standard_normal(position.size)
+    if resolution:
+        seen = np.round(seen / resolution) * resolution
+    description = RecordDescription.of(
+        "test", sample_rate_hz=rate, level=0, levels=1, realization=0, realizations=1
+    )
+    return RecordSet("test", rate, (Record("run", description, None, torque, seen, None),))
+
+
+def there_and_back(speeds, span, rate) -> np.ndarray:
+    """Return sweeps of a span, one at each speed."""
+    up = [v / rate * np.arange(int(span / v * rate)) - span / 2 for v in speeds]
+    return np.concatenate([sweep for one in up for sweep in (one, one[::-1])])
+
+
+def test_friction_and_gravity_of_a_stranger_show_only_together():
+    position = there_and_back((0.1, 0.3), 1.5, 1000.0)
+    records = held_record(
+        position, 1000.0,
+        lambda y, v: 30.0 * np.sin(y + 0.4) + 8.0 * np.sign(v) + 12.0 * v, 0.5, 1e-5,
+    )  # fmt: skip
+    diagnosis = investigate_any(records, {**ROTOR, "jm": 2.0}).diagnosis
+    sizes = {name: found.value for name, found in diagnosis.parameters.items()}
+    assert sizes["gravity.torque_nm"] == pytest.approx(30.0, rel=0.02)
+    assert sizes["coulomb_friction.motor_nm"] == pytest.approx(8.0, rel=0.06)
+    assert sizes["viscous_friction.motor_nm_s_rad"] == pytest.approx(12.0, rel=0.09)
+    assert set(diagnosis.effects) == {"gravity", "coulomb_friction", "viscous_friction"}
+
+
+def test_one_speed_one_way_does_not_tell_frictions_apart():
+    position = 0.1 / 50.0 * np.arange(6000)
+    records = held_record(position, 50.0, lambda y, v: 2.0 * np.sign(v), 0.05)
+    (cause,) = investigate_any(records, ROTOR).diagnosis.causes
+    alike = {"coulomb_friction", "viscous_friction", "torque_bias"}
+    assert alike <= {cause.effect, *cause.others}
+
+
+def test_a_friction_of_no_catalogue_is_not_named():
+    position = there_and_back((0.05, 0.15), 6.0, 50.0)
+    known = {**ROTOR, "jm": 0.05, "fsm": 2.0, "fvm": 0.5}
+
+    def worn(y, v):
+        return np.sign(v) * (2.0 + 1.5 * np.exp(-(((y - 1.0) / 0.3) ** 2))) + 0.5 * v
+
+    diagnosis = investigate_any(held_record(position, 50.0, worn, 0.02), known).diagnosis
+    assert diagnosis.verdict == "unexplained" and not diagnosis.causes
+
+
+def test_torque_quicker_than_what_noise_hides_is_no_slow_motion():
+    rate, time = 1000.0, np.arange(16000) / 1000.0
+    noise = 5e-3 * np.random.default_rng(2).standard_normal(time.size)
+    records = held_record(
+        5.0 * time + noise, rate, lambda y, v: 0.1 + 0.2 * np.sin(2 * np.pi * 60.0 * time), 0.02
+    )
+    assert stations(records, {**ROTOR, "jm": 2e-4}) is None
