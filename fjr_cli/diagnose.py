@@ -25,8 +25,8 @@ def diagnose(
         str,
         typer.Option(
             metavar="paper|FILE",
-            help="Datasheet of the bare plant: a ROS parameter file with all values below "
-            "/rig/simulator, or paper for the paper's values.",
+            help="Datasheet of the bare plant: a YAML file of its values, by themselves or below "
+            "/rig/simulator as in a ROS parameter file, or paper for the paper's values.",
         ),
     ],
     out: Annotated[Path | None, results_folder("REAL_FOLDER/diagnosis")] = None,

@@ -17,7 +17,7 @@ import difflib
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 
 import yaml
 from yaml import MappingNode, Node, ScalarNode, SequenceNode
@@ -54,6 +54,7 @@ def load_parameter_file(
     namespace: str = NAMESPACE,
     nodes: Sequence[str] = NODES,
     groups: Mapping[str, ParameterGroup] | None = None,
+    bare: str | None = None,
 ) -> dict[str, dict[str, Any]]:
     """Read a parameter file.
 
@@ -64,6 +65,7 @@ def load_parameter_file(
         groups: descriptions by node base name. What a wildcard gives then goes to the nodes that
             have such a parameter, and `NODES_OWN` are left out, so that a file that serves the
             nodes serves whoever needs only these descriptions.
+        bare: base name of the node that a file is for which holds values and names no node.
 
     Returns:
         {node base name: {parameter: value}} of the nodes that the file names; a list is a tuple.
@@ -75,6 +77,8 @@ def load_parameter_file(
             that no node has.
     """
     root = _compose(_read(path), str(path))
+    if bare is not None and _names_no_node(root):
+        return {bare: dict(_values(path, bare, root, ""))}
     found: dict[str, dict[str, Any]] = {}
     known = ", ".join(f"{namespace}/{node}" for node in nodes)
     foreign = []
@@ -250,6 +254,13 @@ def _nodes(path: str | Path, node: Node, name: str) -> Iterator[tuple[str, Node]
                 f"{line}: {key} must hold {_PARAMETERS}, as in {{/rig/simulator: {{{_PARAMETERS}: "
                 "{k1: 0.0}}}."
             )
+
+
+def _names_no_node(root: Node | None) -> TypeGuard[MappingNode]:
+    """Tell whether a file holds values and nothing below a name."""
+    if not isinstance(root, MappingNode) or not root.value:
+        return False
+    return not any(isinstance(value, MappingNode) for _, value in root.value)
 
 
 def _matches(pattern: str, name: str) -> bool:

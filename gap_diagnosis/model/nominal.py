@@ -59,9 +59,10 @@ def read_nominal(source: str | Path) -> dict[str, float]:
     """Return the nominal parameters of the bare plant (PLANT names, SI units).
 
     Args:
-        source: `paper`, or a ROS parameter file that names them under /rig/simulator. Friction and
-            k1 that it leaves out are zero: the datasheet lacks them. Without j and k0, or with an
-            infinite k0, the axis is rigid, and jm is all its inertia but for j, which may be zero.
+        source: `paper`, or a YAML file that holds them, by themselves (`jm: 0.02`) or under
+            /rig/simulator as a ROS parameter file. Friction and k1 that it leaves out are zero: the
+            datasheet lacks them. Without j and k0, or with an infinite k0, the axis is rigid, and
+            jm is all its inertia but for j, which may be zero.
 
     Raises:
         InputError: no such file, no simulator in it, an unknown name, an inertia or a stiffness
@@ -69,12 +70,12 @@ def read_nominal(source: str | Path) -> dict[str, float]:
     """
     if str(source) == PAPER:
         return {name: float(value) for name, value in PLANT.defaults().items()}
-    given = load_parameter_file(source).get("simulator")
+    given = load_parameter_file(source, bare="simulator").get("simulator")
     if given is None:
         raise InputError(
             f"{source}: /rig/simulator is missing; write the datasheet's values below it."
         )
-    return datasheet(given, f"{source}: /rig/simulator")
+    return datasheet(given, str(source))
 
 
 def datasheet(given: Mapping[str, object], where: str) -> dict[str, float]:

@@ -44,6 +44,16 @@ def test_a_campaign_file_with_all_effects_off_is_a_nominal(tmp_path):
     assert read_nominal(file) == PAPER
 
 
+def test_values_may_stand_by_themselves(tmp_path):
+    file = tmp_path / "axis.yaml"
+    file.write_text("{jm: 90.0, fsm: 20.0, k0: .inf}")
+    found = read_nominal(file)
+    assert found["jm"] == 90.0 and found["fsm"] == 20.0 and Model.nominal(found).rigid
+    file.write_text("jm: 90.0\nmass: 3.0\n")
+    with pytest.raises(InputError, match=r"axis.yaml: .*mass"):
+        read_nominal(file)
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [
