@@ -14,19 +14,19 @@ from fjr_records.driven import wrong_sign
 from fjr_records.records import RecordSet
 
 from .gates.bag_deviations import GROUPS
-from .gates.bags_gate import as_bags, record_changes, scattering
+from .gates.bags_gate import as_bags, drift_of_runs, record_changes, scattering
 from .how_far.record_ledger import Ledger
 from .kept_causes import kept
 from .model.evidence import Evidence
 from .model.quasi_static import NOTE as QUASI_STATIC
 from .model.quasi_static import Stations
 from .model.record_length import within
-from .model.record_torque import CONTINUOUS, with_continuous_torque
 from .model.simulated_rig import Model
 from .notes import at_limits
 from .outcome.diagnosis import Bags, Diagnosis
 from .outcome.verdict_words import OUT_OF_TIME
 from .record_judgement import Tested, judge_records
+from .torque_timing import Timing, timed
 from .which.catalogue import catalogue
 from .which.cell_fits import CellFit, CellFitter
 from .which.equivalents import founded, partners
@@ -49,6 +49,8 @@ LOST = (
     "are sampled fast enough for the rig."
 )
 
+_HOPELESS = 5.0
+"""Times the motion: where the refit misses more, nothing is searched, for no effect mends that."""
 _SHOWN = 3
 """Most runs of which the same is said."""
 _SEARCH_SHARE = 0.6
@@ -115,19 +117,26 @@ def investigate_records(
     if slow is None:
         records, cut = within(records)
         progress("windows and noise")
-        fitter, refit, heard = _refitted(records, nominal, tolerance, progress)
+        timing = timed(records, nominal, tolerance, progress)
     else:
-        cut, heard = [], [QUASI_STATIC]
+        cut = []
         progress("torque of the slow motion")
         fitter = CellFitter(Evidence(records, nominal, slow), model.plant, tolerance)
-        refit = fitter.refit()
-    evidence = fitter.evidence
-    found = Stepwise(fitter, names, progress, begun + _SEARCH_SHARE * budget_s).run(refit)
+        timing = Timing(fitter, fitter.refit(), (QUASI_STATIC,))
+    until = begun + _SEARCH_SHARE * budget_s
+    if not _follows(timing.fitter, timing.refit, _HOPELESS):
+        names = []
+    found = Stepwise(timing.fitter, names, progress, until).run(timing.refit)
+    if timing.held is not None and timing.better_held(found.best):
+        timing = timing.held
+        progress("search with a torque that is held")
+        found = Stepwise(timing.fitter, names, progress, until).run(timing.refit)
+    fitter, evidence, heard = timing.fitter, timing.fitter.evidence, [*timing.notes]
     progress("scatter from run to run")
     bags, scatter, said = _run_scatter(fitter, found.best)
     heard += said
     found, tested = kept(fitter, found, scatter, progress)
-    if tested and not _follows(fitter, found.best):
+    if (tested or not names) and not _follows(fitter, found.best):
         found, tested = replace(found, steps=found.steps[:1]), []
         heard.append(LOST)
     progress("what may stand in for a cause")
@@ -138,42 +147,9 @@ def investigate_records(
     return RecordInvestigation(fitter, model, found, tuple(tested), diagnosis)
 
 
-def _follows(fitter: CellFitter, fit: CellFit) -> bool:
-    """Tell whether a fit misses less than the motion itself on the parts that report."""
-    return float(np.mean(Ledger(fitter.evidence).squares(fit.model))) < 1.0
-
-
-def _refitted(
-    records: RecordSet, nominal: Mapping[str, float], tolerance: float, progress: Progress
-) -> tuple[CellFitter, CellFit, list[str]]:
-    """Return the fit of the base parameters, with a torque that acts as unseen parts call for.
-
-    Where no loop makes it, the recorded torque drives the model: held, unless it is no command and
-    does clearly better as a signal. Both may come late, so that half a sample of delay decides
-    nothing.
-    """
-    plant = Model.nominal(nominal).plant
-    progress("refit of the base parameters")
-    fitter = CellFitter(Evidence(records, nominal), plant, tolerance)
-    refit, loop = fitter.refit(), fitter.evidence.simulator.loop
-    if None not in loop.laws or loop.commanded:
-        return fitter, refit, []
-    progress("refit with a torque that is not held")
-    flowing = with_continuous_torque(records, loop)
-    other = CellFitter(Evidence(flowing, nominal), plant, tolerance)
-    again = other.refit()
-    if gain(fitter, _late(other, again), _late(fitter, refit)).present:
-        return other, again, [CONTINUOUS]
-    return fitter, refit, []
-
-
-def _late(fitter: CellFitter, refit: CellFit) -> CellFit:
-    """Return a fit with a delay, where that gains."""
-    proposals = fitter.screening(refit, "delay").proposals()
-    delayed = fitter.add(refit, "delay", proposals) if proposals else None
-    if delayed is None or fitter.gains(delayed, refit).sum() <= 0.0:
-        return refit
-    return delayed
+def _follows(fitter: CellFitter, fit: CellFit, times: float = 1.0) -> bool:
+    """Tell whether a fit misses less than some times the motion on the parts that report."""
+    return float(np.mean(Ledger(fitter.evidence).squares(fit.model))) < times**2
 
 
 def _run_scatter(
@@ -186,8 +162,10 @@ def _run_scatter(
         if not moved_by_scatter(best, fitter.runs, scatter).any():
             return None, {}, []
         return None, scatter, [ASSUMED]
-    bags, seen = as_bags(changes, 0.0), scattering(changes)
+    runs = len(fitter.evidence.records.records)
+    bags, seen = as_bags(changes, runs - 1.0), scattering(changes)
     said = [f"What scatters from run to run: {seen}."] if seen else []
+    said += [drift] if (drift := drift_of_runs(changes, runs)) else []
     return bags, relative_scatter(bags), said
 
 

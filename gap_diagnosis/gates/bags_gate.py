@@ -11,7 +11,7 @@ from fjr_records.periodic import RecordedExperiment
 from ..model.evidence import Evidence
 from ..model.simulated_rig import Model, Simulator
 from ..outcome.diagnosis import Bags, BagTrend, Estimate
-from .bag_changes import TREND_FALSE_ALARM, BagChanges, bag_changes
+from .bag_changes import TREND_FALSE_ALARM, BagChanges, Trend, bag_changes
 from .bag_deviations import periodic_errors, record_errors
 from .gate_checks import Gate, GateReport, untested
 
@@ -50,7 +50,7 @@ def bags_gate(
     changes = periodic_changes(recorded, noise, simulator, model) if noise is not None else None
     if changes is None:
         return untested(name, needs)
-    worst = min(changes.trends, key=lambda trend: trend.p_value)
+    worst = worst_trend(changes)
     span_s = float(np.ptp([r.experiment.elapsed_s for r in recorded.realizations]))
     passed = worst.p_value > TREND_FALSE_ALARM
     scatter = scattering(changes)
@@ -59,8 +59,7 @@ def bags_gate(
         sentence += f"; without one, {scatter} scatters." if scatter else "."
     else:
         sentence = (
-            f"{worst.group} follows a trend from bag to bag (by chance in {worst.p_value:.1g} of "
-            f"rigs that only scatter), along a line by {worst.slope_per_s * span_s:+.2%} over the "
+            f"{worst.group} follows a trend from bag to bag {_along(worst, span_s)} over the "
             "record; let the rig warm up, or record levels interleaved."
         )
     z, limit = (float(norm.isf(0.5 * max(p, 1e-300))) for p in (worst.p_value, TREND_FALSE_ALARM))
@@ -86,7 +85,9 @@ def periodic_changes(
 
 
 def record_changes(evidence: Evidence, variance: np.ndarray, model: Model) -> BagChanges | None:
-    """Return how parameters scatter from record to record; see `bag_changes`.
+    """Return how parameters scatter and drift from record to record; see `bag_changes`.
+
+    A trend is one over the order of the records, since nothing tells when they began.
 
     Args:
         evidence: the records.
@@ -95,11 +96,38 @@ def record_changes(evidence: Evidence, variance: np.ndarray, model: Model) -> Ba
     """
     levels = np.array([r.level for r in evidence.records.records])
     errors, blocks = record_errors(evidence, variance)
-    return bag_changes(errors, levels, None, model, blocks)
+    return bag_changes(errors, levels, np.arange(levels.size, dtype=float), model, blocks)
+
+
+def worst_trend(changes: BagChanges) -> Trend:
+    """Return the trend that chance makes least often."""
+    return min(changes.trends, key=lambda trend: trend.p_value)
+
+
+def drift_of_runs(changes: BagChanges, runs: int) -> str:
+    """Return the sentence on a trend over runs in the order of their files; empty without one."""
+    worst = worst_trend(changes)
+    if worst.p_value > TREND_FALSE_ALARM:
+        return ""
+    return (
+        f"In the order of the runs {worst.group} follows a trend {_along(worst, runs - 1.0)} from "
+        "the first to the last: if they were recorded in this order, let the rig warm up, or "
+        "record levels interleaved."
+    )
+
+
+def _along(trend: Trend, span: float) -> str:
+    return (
+        f"(by chance in {trend.p_value:.1g} of rigs that only scatter), along a line by "
+        f"{trend.slope_per_s * span:+.2%}"
+    )
 
 
 def as_bags(changes: BagChanges, span_s: float) -> Bags:
-    """Return changes as the outcome holds them; `span_s` is from the first bag to the last."""
+    """Return changes as the outcome holds them; `span_s` is from the first bag to the last.
+
+    Of records, whose order alone is known, it is their number less one.
+    """
     return Bags(
         trends={
             t.group: BagTrend(change_percent=100.0 * t.slope_per_s * span_s, p_value=t.p_value)

@@ -2,7 +2,7 @@
 
 Both searches try the effects of `catalogue` from starts of `search_space` in the measures of
 `scales`, choose where to begin by `screening` (ripples by `ripples`, `ripples_of_records` and
-`ripples_seen`), and fit by `least_squares`.
+`seen_torques`), and fit by `least_squares`.
 
 Steady periods: `fits`, `search`, `harmonics`, `reduced_fits`, then `attribution`, `estimates` and
 `confidence`. Records: `cell_fits` with the remainder in the covariance (`cell_weights`, and

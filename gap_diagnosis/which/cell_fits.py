@@ -24,10 +24,10 @@ from .cell_weights import CellWeights
 from .from_parts import from_part
 from .least_squares import Solution, solve
 from .ripples_of_records import RecordRipples
-from .ripples_seen import SeenRipples
 from .scales import Scales
 from .screening import LARGEST, LARGEST_OF_TORQUES, Proposal, Screening
 from .search_space import Space, space_for, starts
+from .seen_torques import LOADS, SeenTorques
 from .unseen_friction import beside_scatter, deviated
 
 _REFIT_ROUNDS = (8, 5, 5)
@@ -82,7 +82,7 @@ class CellFitter:
     def __init__(self, evidence: Evidence, nominal: Mapping[str, float], tolerance: float) -> None:
         """Prepare."""
         self.evidence, self.nominal, self.tolerance = evidence, dict(nominal), tolerance
-        self._rippled: tuple[CellFit, tuple[RecordRipples, SeenRipples]] | None = None
+        self._rippled: tuple[CellFit, tuple[RecordRipples, SeenTorques]] | None = None
         self.weights = CellWeights(evidence)
         self.fit_parts, self.select_parts = self.weights.fit_parts, self.weights.select_parts
         self.groups, self.runs = evidence.stretch_of(self.fit_parts), self.weights.runs
@@ -114,6 +114,8 @@ class CellFitter:
                 predicted.cycles(effect, tried, RIPPLES_TRIED),
                 along.seeds(effect, tried),
             )
+        elif effect in LOADS:
+            seen = self._ripples(parent)[1].load(effect)
         seeds = [*starts(effect, self.scales, cycles, self.nominal), *seen]
         return self.screening_of(parent, seeds)
 
@@ -255,11 +257,11 @@ class CellFitter:
         alone = beside_scatter(errors, weight, self.weights.unseen)
         return self.weights.mean_squares(alone) + self.weights.select_floor
 
-    def _ripples(self, parent: CellFit) -> tuple[RecordRipples, SeenRipples]:
+    def _ripples(self, parent: CellFit) -> tuple[RecordRipples, SeenTorques]:
         if self._rippled is None or self._rippled[0] is not parent:
             weight, solution = self.weights.weight(parent.variance), parent.solution
             at = self.evidence, self.fit_parts, parent.model
-            self._rippled = parent, (RecordRipples(*at, weight, solution), SeenRipples(*at))
+            self._rippled = parent, (RecordRipples(*at, weight, solution), SeenTorques(*at))
         return self._rippled[1]
 
     def _space(self, parent: CellFit, seed: Mapping[str, float]) -> Space:

@@ -16,6 +16,7 @@ from .cell_fits import CellFit, CellFitter
 from .equivalents import ONE_CAUSE, founded, holders, partners, plainness
 from .gains import Gain, closed, gain, left_of, stands_for
 from .harmonics import with_second_harmonic
+from .presence import at_its_bound
 from .screening import Proposal, Screening
 
 MOST_CAUSES = 5
@@ -102,7 +103,29 @@ class Stepwise:
                 break
             found.alternatives[chosen.effects[-1]] = self._tied(chosen, fits, found.best)
             found.steps.append(chosen)
+            self._replace_bounded(found)
         return found
+
+    def _replace_bounded(self, found: Found) -> None:
+        """Put another effect in the place of a former cause whose shape has come to a bound.
+
+        While a further cause is missing, a law may do in part what that does, and beside it end as
+        a limit case of another law: a cable that gives way at once is viscous friction.
+        """
+        for effect in found.best.effects[:-1]:
+            best = found.best
+            if not at_its_bound(best, effect):
+                continue
+            without = self._fitter.without(best, effect)
+            fits = self._extended(without, found.steps[0])
+            free = [f for f in fits if not at_its_bound(f, f.effects[-1])]
+            other = self._chosen(free, without)
+            worth = self._gain(best, without).mean
+            if other is None or not stands_for(self._gain(best, other), worth):
+                continue
+            before = [fit for fit in found.steps if effect not in fit.effects]
+            found.alternatives[other.effects[-1]] = self._tied(other, fits, without)
+            found.steps[:] = [*before, without, other]
 
     def _pairs(self, fits: Sequence[CellFit], refit: CellFit) -> list[CellFit]:
         """Return the leading fits with each promising effect more, best on unseen parts first.

@@ -1,9 +1,10 @@
-"""Ripples that are seen along the recorded motion, in the torque that the model lacks there.
+"""Ripples and loads that are seen along the recorded motion, in the torque that the model lacks.
 
 A ripple that holds a motor at rest, or decides where it stops, moves it far from where the model
-without it goes; what it does cannot be predicted along the model's motion. But an observer that
-holds the model to the recorded motion says which torque the model lacks at each recorded angle:
-size, number and phase of a ripple follow by least squares, and are starting points as they are.
+without it goes; what it does cannot be predicted along the model's motion. Nor can a load that the
+integrator of a loop takes over: the motion hardly shows it. But an observer that holds the model to
+the recorded motion says which torque the model lacks at each recorded angle: size, number and phase
+follow by least squares, and are starting points as they are.
 """
 
 from __future__ import annotations
@@ -17,6 +18,9 @@ from fjr_sim_node import effects as fx
 from ..model.evidence import Evidence
 from ..model.simulated_rig import Model
 
+LOADS = ("torque_bias", "gravity", "external_spring")
+"""Effects whose torque does not depend on the motion but for the angle."""
+
 _PER_CROSSOVER = 8.0  # averages in a period of the observer's crossover
 _FASTEST = 1.0  # ripples of a higher frequency, over the crossover, the observer does not follow
 _REST = 0.03  # of the rms velocity: below, friction is whatever holds
@@ -24,7 +28,7 @@ _PEAKS = 2
 _NEARLY, _ALIKE = 0.95, 4  # of the best; how many of those that explain so much
 
 
-class SeenRipples:
+class SeenTorques:
     """The torque that a model lacks along the recorded motion of the fitted parts."""
 
     def __init__(self, evidence: Evidence, parts: Sequence[int], model: Model) -> None:
@@ -54,6 +58,35 @@ class SeenRipples:
         found: np.ndarray = np.concatenate(columns, axis=1)
         self._angle, self._torque, self._missing = found[0], found[1], found[2]
         self._velocity, self._acceleration = found[3], found[4]
+
+    def load(self, effect: str) -> list[dict[str, float]]:
+        """Return the starting point of a torque that depends on the angle alone, or on nothing.
+
+        Args:
+            effect: one of `LOADS`.
+        """
+        if self._angle.size < 4 * _PER_CROSSOVER or not np.isfinite(self._missing).all():
+            return []
+        one, angle = np.ones(self._angle.size), self._angle
+        motion = [self._velocity, np.sign(self._velocity), self._acceleration]
+        columns = {
+            "torque_bias": [one],
+            "gravity": [-np.sin(angle), -np.cos(angle)],
+            "external_spring": [-angle, one],
+        }[effect]
+        size, *rest = np.linalg.lstsq(
+            np.array([*columns, *motion]).T, self._missing, rcond=1e-9
+        )[0].tolist()  # fmt: skip
+        if effect == "torque_bias":
+            return [{"torque_bias.torque_nm": size}]
+        if effect == "gravity":
+            torque, direction = float(np.hypot(size, rest[0])), float(np.arctan2(rest[0], size))
+            return [{"gravity.torque_nm": torque, "gravity.angle_rad": direction}]
+        if not size > 0.0:
+            return []
+        return [
+            {"external_spring.stiffness_nm_rad": size, "external_spring.rest_rad": rest[0] / size}
+        ]
 
     def seeds(self, effect: str, tried: np.ndarray) -> list[dict[str, float]]:
         """Return starting points of a ripple, by full parameter names.

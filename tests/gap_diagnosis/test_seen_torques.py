@@ -8,7 +8,7 @@ from test_evidence import NOMINAL, records
 
 from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.which.cell_fits import CellFitter
-from gap_diagnosis.which.ripples_seen import SeenRipples, _best
+from gap_diagnosis.which.seen_torques import SeenTorques, _best
 
 CASES = {
     "cogging": {"amplitude_nm": 6.0, "cycles_per_turn": 45.0, "phase_rad": 0.7},
@@ -26,7 +26,7 @@ def named(effect: str) -> dict[str, float]:
 def test_number_size_and_phase_are_seen(effect, known):
     truth = named(effect)
     fitter = CellFitter(Evidence(records(truth, known=known), NOMINAL), NOMINAL, 0.1)
-    seen = SeenRipples(fitter.evidence, fitter.fit_parts, fitter.refit().model)
+    seen = SeenTorques(fitter.evidence, fitter.fit_parts, fitter.refit().model)
     seeds = seen.seeds(effect, np.arange(20.0, 70.0))
     cycles, phase = f"{effect}.cycles_per_turn", f"{effect}.phase_rad"
     (size,) = set(truth) - {cycles, phase}
@@ -55,7 +55,7 @@ def test_a_ripple_that_decides_where_the_motor_rests_is_found():
 def test_nothing_is_seen_of_a_transmission_or_beyond_what_the_observer_follows():
     evidence = Evidence(records(seconds=5.0), NOMINAL)
     fitter = CellFitter(evidence, NOMINAL, 0.1)
-    seen = SeenRipples(evidence, fitter.fit_parts, fitter.refit().model)
+    seen = SeenTorques(evidence, fitter.fit_parts, fitter.refit().model)
     assert seen.seeds("kinematic_error", np.arange(20.0, 70.0)) == []
     assert seen.seeds("cogging", np.arange(1e6, 1e6 + 50.0)) == []
 

@@ -1,0 +1,93 @@
+"""Where the recorded torque drives the model: was it held from sample to sample, or a signal?
+
+Both differ by half a sample, as a delay does. Which of them it was shows in the end: while causes
+are missing, a delay does in part what they would, and half a sample of it may decide.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from fjr_records.records import RecordSet
+
+from .model.evidence import Evidence
+from .model.record_torque import CONTINUOUS, with_continuous_torque
+from .model.simulated_rig import Model
+from .which.cell_fits import CellFit, CellFitter
+from .which.gains import gain, stands_for
+
+Progress = Callable[[str], None]
+
+_IS_HELD = 0.2
+"""Of a sample: how far from half a sample may lie what comes late of a signal that is held."""
+_LATE = {"delay": "delay.time_s", "actuator_lag": "actuator_lag.time_constant_s"}
+
+
+@dataclass(frozen=True)
+class Timing:
+    """What a search begins with.
+
+    Attributes:
+        fitter: of the records, their torque being held or a signal.
+        refit: fit of the base parameters alone.
+        notes: sentences on it.
+        held: the same with a torque that is held; None where it is, or a loop makes it.
+    """
+
+    fitter: CellFitter
+    refit: CellFit
+    notes: tuple[str, ...] = ()
+    held: Timing | None = None
+
+    def better_held(self, best: CellFit) -> bool:
+        """Tell whether what was found is a delay of half a sample, of a torque that is held."""
+        rate = self.fitter.evidence.records.sample_rate_hz
+        late = [e for e in best.effects if e in _LATE and _half(best.model, e, rate)]
+        if self.held is None or not late:
+            return False
+        (effect,) = late[:1]
+        worth = gain(self.fitter, best, self.fitter.without(best, effect)).mean
+        held = self.held.fitter.without(best, effect)
+        return stands_for(gain(self.fitter, best, held), worth)
+
+
+def _half(model: Model, effect: str, rate: float) -> bool:
+    return abs(model.effects[_LATE[effect]] * rate - 0.5) < _IS_HELD
+
+
+def timed(
+    records: RecordSet, nominal: Mapping[str, float], tolerance: float, progress: Progress
+) -> Timing:
+    """Return the fit of the base parameters, with a torque that acts as unseen parts call for.
+
+    Where no loop makes it, the recorded torque drives the model: held, unless it is no command and
+    does clearly better as a signal. Both may come late, so that half a sample of delay decides
+    nothing. A signal that comes half a sample late is one that is held.
+    """
+    plant = Model.nominal(nominal).plant
+    progress("refit of the base parameters")
+    fitter = CellFitter(Evidence(records, nominal), plant, tolerance)
+    refit, loop = fitter.refit(), fitter.evidence.simulator.loop
+    held = Timing(fitter, refit)
+    if None not in loop.laws or loop.commanded:
+        return held
+    progress("refit with a torque that is not held")
+    flowing = with_continuous_torque(records, loop)
+    other = CellFitter(Evidence(flowing, nominal), plant, tolerance)
+    again = other.refit()
+    late = _late(other, again)
+    if "delay" in late.effects and _half(late.model, "delay", records.sample_rate_hz):
+        return held
+    if gain(fitter, late, _late(fitter, refit)).present:
+        return Timing(other, again, (CONTINUOUS,), held)
+    return held
+
+
+def _late(fitter: CellFitter, refit: CellFit) -> CellFit:
+    """Return a fit with a delay, taken to its end, where that gains."""
+    proposals = fitter.screening(refit, "delay").proposals()
+    delayed = fitter.add(refit, "delay", proposals) if proposals else None
+    if delayed is None or fitter.gains(delayed, refit).sum() <= 0.0:
+        return refit
+    return delayed if delayed.solution.converged else fitter.further(delayed)
