@@ -48,8 +48,6 @@ _UNCERTAIN = 0.5  # of what a cause whose size is not certain would be present
 _DOUBTED = 0.7  # over what remains: a cause that closes such a share is there as often as not
 _LITTLE = 0.2  # of what it closes and what is left: less is there less often than its band says
 _IF_NOTHING = 0.75  # of what a cause would be present, where all of that is left
-_SMALL = 0.06  # of the gap: a cause whose share is less is there less often than not
-_IF_SMALLEST = 0.5  # of what a cause would be present, whose share is nothing
 
 THIN = (
     "The records are too short or too few to hold anything out of the fits, so nothing is named: "
@@ -116,8 +114,7 @@ class Tested:
 
         A cause that closes little of the gap, and little even in the band where it gains most, may
         be a part of what no effect explains. Of 11 causes of the blind checks 307 to 311 that
-        closed less than a quarter of what was left, 6 were right, stated at 0.79 in the mean. Of 15
-        of 307 to 313 whose share of the gap was below 7 % 4 were right, of 380 above 10 % 360.
+        closed less than a quarter of what was left, 6 were right, stated at 0.79 in the mean.
         """
         sure = (1.0 - min(1.0, 5.0 * self.gain.p)) * min(1.0, self.gain.share + 0.1)
         of_all = self.share.low if self.share.low is not None and self.share.low > 0.0 else 0.0
@@ -126,8 +123,6 @@ class Tested:
         share = max(0.0, self.share.value)
         beside_left = share / max(share + self.left, 1e-300)
         sure *= _IF_NOTHING + (1.0 - _IF_NOTHING) * min(beside_left / _LITTLE, 1.0)
-        if self.share.value >= 0.0:
-            sure *= _IF_SMALLEST + (1.0 - _IF_SMALLEST) * min(self.share.value / _SMALL, 1.0)
         sure *= doubt_of_shape(self.ripples)
         if not self.certain or self.bounded:
             sure *= _UNCERTAIN

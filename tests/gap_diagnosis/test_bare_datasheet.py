@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -9,12 +10,12 @@ import pytest
 from test_evidence import NOMINAL, records
 
 from gap_diagnosis.model.evidence import Evidence
-from gap_diagnosis.record_investigation import RecordInvestigation, investigate_records
+from gap_diagnosis.record_investigation import LOST, RecordInvestigation, investigate_records
 from gap_diagnosis.which.cell_fits import CellFitter
 from gap_diagnosis.which.equivalents import founded
 from gap_diagnosis.which.gains import left_of
-from gap_diagnosis.which.presence import LEAST_INVARIANCE_P, invariance
-from gap_diagnosis.which.stepwise import Stepwise
+from gap_diagnosis.which.presence import LEAST_INVARIANCE_P, at_its_bound, invariance
+from gap_diagnosis.which.stepwise import Found, Stepwise
 
 BARE = {**NOMINAL, "fs": 0.0, "fsm": 0.0, "fv": 0.0, "fvm": 0.0}
 LOOKED_FOR = (
@@ -98,3 +99,31 @@ def test_friction_that_scatters_may_differ_between_levels_of_one_run(scatter):
     friction = dict.fromkeys(("fs", "fsm", "fv", "fvm"), scatter)
     p = invariance(fitter, fit, "coulomb_friction", friction)
     assert p > 3.0 * LEAST_INVARIANCE_P if scatter else p < LEAST_INVARIANCE_P
+
+
+def test_a_law_whose_shape_comes_to_a_bound_gives_way_to_the_law_that_it_is_there():
+    """A cable that yields at once resists velocity, as viscous friction does."""
+    fitter = CellFitter(Evidence(records(runs=2), BARE), BARE, 0.1)
+    fits = [fitter.refit()]
+    for effect in ("cable", "coulomb_friction"):
+        proposals = fitter.screening(fits[-1], effect).proposals()
+        fits.append(fitter.further(fitter.add(fits[-1], effect, proposals)))
+    assert at_its_bound(fits[-1], "cable")
+    names = ["cable", "viscous_friction", "coulomb_friction"]
+    search, found = Stepwise(fitter, names, lambda _: None, math.inf), Found(fits)
+    search._replace_bounded(found)
+    assert [fit.effects for fit in found.steps[1:]] == [
+        ("coulomb_friction",),
+        ("coulomb_friction", "viscous_friction"),
+    ]
+    expected = {"fsm": "coulomb_friction.motor_nm", "fs": "coulomb_friction.link_nm",
+                "fvm": "viscous_friction.motor_nm_s_rad"}  # fmt: skip
+    for friction, name in expected.items():
+        assert found.best.model.effects[name] == pytest.approx(NOMINAL[friction], rel=0.01)
+
+
+def test_where_the_refit_misses_far_more_than_the_motion_nothing_is_searched():
+    absurd = {**NOMINAL, "jm": 1e-4, "k0": 5.0, "fsm": 0.0, "fvm": 0.01}
+    tried = investigate_records(records(), absurd)
+    assert LOST in tried.diagnosis.notes and tried.diagnosis.verdict == "unexplained"
+    assert len(tried.found.steps) == 1 and tried.found.rivals == {1: []}

@@ -61,6 +61,16 @@ def test_a_parameter_that_one_group_alone_tells_is_not_called_certain():
     assert std[1] >= 0.9 * np.sqrt(1.0 / np.count_nonzero(GROUP == 3)) == pytest.approx(0.127, 0.01)
 
 
+def test_a_parameter_that_one_group_nearly_alone_tells_is_as_uncertain_as_that_group_says():
+    """Left out, what the other groups hint at would stand in for it, however wildly."""
+    jacobian = np.stack([np.ones(LINES), np.where(GROUP == 3, 1.0, 0.01)], axis=1)
+    residuals = np.random.default_rng(4).standard_normal(LINES)
+    residuals += 3.0 * np.sin(2.0 * np.pi * 1.3 * AT)
+    residuals -= jacobian @ np.linalg.lstsq(jacobian, residuals, rcond=None)[0]
+    alone = np.sqrt(np.mean(residuals**2) / np.count_nonzero(GROUP == 3))
+    assert alone < standard_errors(jacobian, residuals, GROUP)[1] < 12.0 * alone
+
+
 def fitted(names: tuple[str, ...], values: tuple[float, ...], stds: tuple[float, ...]) -> Fit:
     """Return a fit of effects whose parameters have these values and standard errors."""
     rng = np.random.default_rng(6)

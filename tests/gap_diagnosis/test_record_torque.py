@@ -12,8 +12,14 @@ from fjr_interface.experiment import RecordDescription
 from fjr_records.records import Record, RecordSet
 from fjr_sim_node import plant
 from fjr_sim_node.simulation import closed_loop
-from gap_diagnosis.model.record_torque import CONTINUOUS, mean_over_samples
-from gap_diagnosis.record_investigation import _refitted
+from gap_diagnosis.model.evidence import Evidence
+from gap_diagnosis.model.record_torque import (
+    CONTINUOUS,
+    mean_over_samples,
+    with_continuous_torque,
+)
+from gap_diagnosis.torque_timing import Timing, timed
+from gap_diagnosis.which.cell_fits import CellFitter
 
 RATE, FINER = 200.0, 10
 NOMINAL = {name: float(value) for name, value in plant.PLANT.defaults().items()}
@@ -51,8 +57,26 @@ def runs(finer: int) -> RecordSet:
     return RecordSet("test", RATE, tuple(made))
 
 
-@pytest.mark.parametrize(("finer", "told"), [(1, []), (FINER, [CONTINUOUS])])
+@pytest.mark.parametrize(("finer", "told"), [(1, ()), (FINER, (CONTINUOUS,))])
 def test_a_torque_that_went_on_between_its_samples_is_told_from_one_that_was_held(finer, told):
-    _, refit, notes = _refitted(runs(finer), NOMINAL, 0.1, lambda _: None)
-    assert notes == told
-    assert refit.model.plant["jm"] == pytest.approx(NOMINAL["jm"], rel=0.05)
+    timing = timed(runs(finer), NOMINAL, 0.1, lambda _: None)
+    assert timing.notes == told
+    assert timing.refit.model.plant["jm"] == pytest.approx(NOMINAL["jm"], rel=0.05)
+    assert (timing.held is None) == (not told)
+
+
+@pytest.mark.parametrize(("finer", "held"), [(1, True), (FINER, False)])
+def test_half_a_sample_of_delay_of_a_signal_is_a_torque_that_was_held(finer, held):
+    """What a search ends with that began with a signal, since a missing cause made it do better."""
+    recorded = runs(finer)
+    by_hold = CellFitter(Evidence(recorded, NOMINAL), NOMINAL, 0.1)
+    flowing = with_continuous_torque(recorded, by_hold.evidence.simulator.loop)
+    by_signal = CellFitter(Evidence(flowing, NOMINAL), NOMINAL, 0.1)
+    refit = by_signal.refit()
+    timing = Timing(by_signal, refit, (CONTINUOUS,), Timing(by_hold, by_hold.refit()))
+    assert not timing.better_held(refit)
+    proposals = by_signal.screening(refit, "delay").proposals()
+    late = by_signal.add(refit, "delay", proposals) if proposals else None
+    samples = late.model.effects["delay.time_s"] * RATE if late else 0.0
+    assert samples == pytest.approx(0.5 if held else 0.0, abs=0.1)
+    assert timing.better_held(late or refit) == held

@@ -17,7 +17,7 @@ from fjr_sim_node import effects as fx
 from fjr_sim_node.plant import PLANT, coefficients
 from fjr_sim_node.simulation.closed_loop import simulate
 from gap_diagnosis.gates.bag_deviations import deviations, record_errors
-from gap_diagnosis.gates.bags_gate import as_bags, record_changes, scattering
+from gap_diagnosis.gates.bags_gate import as_bags, drift_of_runs, record_changes, scattering
 from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.model.simulated_rig import Model
 from gap_diagnosis.outcome.diagnosis import Bags, Estimate
@@ -46,10 +46,14 @@ def noise_like(seed: int, samples: int) -> np.ndarray:
     return signal / signal.std()
 
 
-def recorded(share: float, seed: int, effects=None, seconds: float = 6.0):
-    """Return records of a rig whose friction scatters by a share, and each run's factors."""
+def recorded(share: float, seed: int, effects=None, seconds: float = 6.0, rising=0.0):
+    """Return records of a rig whose friction scatters by a share, and each run's factors.
+
+    It may rise as well, by a share for each run.
+    """
     rng, runs = np.random.default_rng(seed), []
     factors = 1.0 + share * rng.standard_normal((len(LEVELS_RAD) * RUNS, len(FRICTION)))
+    factors += np.reshape(rising, (-1, 1))
     for run, row in enumerate(factors):
         level = run // RUNS
         values = PLANT.defaults() | {
@@ -124,7 +128,22 @@ def test_a_steady_rig_whose_law_is_not_quite_the_model_scatters_nowhere():
     records, _ = recorded(0.0, 5, {"cogging.amplitude_nm": 0.3, "cogging.cycles_per_turn": 40.0})
     changes = changes_of(records)
     assert scattering(changes) == ""
-    assert changes.trends == ()
+    assert drift_of_runs(changes, 2 * RUNS) == ""
+
+
+def test_friction_that_rises_from_run_to_run_is_a_trend_and_one_that_scatters_is_none():
+    """Levels are recorded one after the other, so their friction differs as a trend's does."""
+    runs = len(LEVELS_RAD) * RUNS
+    rising = np.linspace(-0.1, 0.1, runs)
+    changes = changes_of(recorded(0.02, 3, rising=rising)[0])
+    said = drift_of_runs(changes, runs)
+    assert said.startswith("In the order of the runs friction follows a trend")
+    assert "interleaved" in said
+    assert as_bags(changes, runs - 1.0).trends["friction"].change_percent == pytest.approx(
+        20, abs=5
+    )
+    for seed in range(3):
+        assert drift_of_runs(changes_of(recorded(0.02, seed)[0]), runs) == ""
 
 
 NOTHING = Bags(trends={}, scatter_percent={}, accounted=1.0)

@@ -1,4 +1,4 @@
-"""Ripples along the recorded motion: the torque that the model lacks there shows them."""
+"""Ripples and loads along the recorded motion: the torque that the model lacks shows them."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import pytest
 from test_evidence import NOMINAL, records
 
 from gap_diagnosis.model.evidence import Evidence
+from gap_diagnosis.model.simulated_rig import Model
 from gap_diagnosis.which.cell_fits import CellFitter
 from gap_diagnosis.which.seen_torques import SeenTorques, _best
 
@@ -63,3 +64,31 @@ def test_nothing_is_seen_of_a_transmission_or_beyond_what_the_observer_follows()
 def test_the_highest_peaks_are_taken_and_what_does_as_well():
     explained = np.array([0.0, 5.0, 1.0, 10.0, 9.8, 9.7, 2.0, 3.0])
     assert _best(explained) == [1, 3, 4, 5]
+
+
+LOAD = {
+    "torque_bias": {"torque_nm": -4.0},
+    "gravity": {"torque_nm": 8.0, "angle_rad": 0.6},
+    "external_spring": {"stiffness_nm_rad": 90.0, "rest_rad": 0.05},
+}
+
+
+@pytest.mark.parametrize("known", [True, False])
+@pytest.mark.parametrize("effect", LOAD)
+def test_a_load_is_seen_as_it_is(effect, known):
+    truth = {f"{effect}.{name}": value for name, value in LOAD[effect].items()}
+    fitter = CellFitter(Evidence(records(truth, known=known), NOMINAL), NOMINAL, 0.1)
+    (seed,) = SeenTorques(fitter.evidence, fitter.fit_parts, Model(NOMINAL, {})).load(effect)
+    assert seed.keys() == truth.keys()
+    if effect == "gravity":  # of small angles: a constant torque and a stiffness
+        angle, size = seed["gravity.angle_rad"], seed["gravity.torque_nm"]
+        assert size * np.sin(angle) == pytest.approx(8.0 * np.sin(0.6), rel=0.1)
+    else:
+        assert list(seed.values()) == pytest.approx(list(truth.values()), rel=0.1)
+
+
+def test_a_spring_that_pushes_is_no_spring():
+    truth = {"gravity.torque_nm": 60.0, "gravity.angle_rad": np.pi}
+    fitter = CellFitter(Evidence(records(truth), NOMINAL), NOMINAL, 0.1)
+    seen = SeenTorques(fitter.evidence, fitter.fit_parts, Model(NOMINAL, {}))
+    assert seen.load("external_spring") == []
