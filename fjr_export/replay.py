@@ -155,7 +155,7 @@ def _played(drive: Drive, target: Stepped) -> np.ndarray:
     state = np.zeros(law.states + 1)
     if drive.entry is not None:
         state[:-1] = drive.entry
-    added = np.zeros(drive.reference.size) if drive.added_torque is None else drive.added_torque
+    added = np.zeros(drive.reference.size) if drive.command is None else drive.command
     position = np.full(drive.reference.size, np.nan)
     target.begin(*drive.start)
     for k, reference in enumerate(drive.reference.tolist()):

@@ -207,8 +207,9 @@ def _notes(evidence: Evidence, found: Found) -> list[str]:
     if evidence.slow:
         return _notes_of_fit(found)
     notes = list(evidence.simulator.loop.notes)
-    doubted = [(r.name, wrong_sign(r.torque, r.position)) for r in evidence.records.records]
-    notes += [f"{name}: {doubt}." for name, doubt in doubted if doubt is not None][:_SHOWN]
+    if not evidence.simulator.loop.commanded:  # a controller that makes the torque has its sign
+        doubted = [(r.name, wrong_sign(r.torque, r.position)) for r in evidence.records.records]
+        notes += [f"{name}: {doubt}." for name, doubt in doubted if doubt is not None][:_SHOWN]
     step = evidence.noise.step_rad
     if step is not None and evidence.noise.std_rad <= 1.01 * step / math.sqrt(12.0):
         notes.append(

@@ -1,9 +1,10 @@
 """Closed-loop batch simulation: the compiled steps of the nodes, without the messages between.
 
 At sample k the encoder gives y = th + noise, the controller answers with u = sat(C_r r - C_y y),
-and u is held to the next sample: the lockstep of the graph. A torque may be added to that of the
-controller: with the recorded torque added and the recorded position as the reference, the loop is
-an observer.
+and u is held to the next sample: the lockstep of the graph. Where the command is given, such as a
+recorded torque, it alone goes through the drive, and the law is an observer that pushes at the
+motor: with the recorded position as its reference it holds the model to the recorded motion, and
+neither a delay nor a limit of the drive that is modelled stands in its way.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from fjr_interface.topics import Signal
 from fjr_kit.compiled import jit
 from fjr_kit.errors import InputError
 
+from .. import effects as fx
 from . import rig
 
 
@@ -89,14 +91,23 @@ def _run(reference, noise, sample_period, p, e, c, x, state, position, torque, l
 
 @jit
 def _run_law(
-    reference, added, noise, sample_period, substeps, p, e, x, law, state,
+    reference, command, noise, sample_period, substeps, p, e, x, law, state,
     position, torque, link, motor,
 ):  # fmt: skip
     b, forward, a, limit = law
+    past = 0.0
+    if e is not None:
+        past = e[fx.TORQUE_BIAS_TORQUE_NM]
     for k in range(reference.size):
         y = rig.measure(state, noise[k], e)
-        u = added[k] + transfer_function.step(x, reference[k], y, b, forward, a, limit)
+        own = transfer_function.step(x, reference[k], y, b, forward, a, limit)
+        u = own
+        if command is not None:
+            u = command[k] + own
         position[k], torque[k], link[k], motor[k] = y, u, state[rig.LINK], state[rig.MOTOR]
+        if e is not None and command is not None and e[fx.DRIVE_ON] != 0.0:
+            e[fx.TORQUE_BIAS_TORQUE_NM] = past + own
+            u = command[k]
         for _ in range(substeps):
             rig.hold(state, u, sample_period / substeps, p, e)
 
@@ -158,7 +169,7 @@ def simulate_law(
     effects: np.ndarray | None = None,
     elapsed_s: float = 0.0,
     *,
-    added_torque: np.ndarray | None = None,
+    command: np.ndarray | None = None,
     start: tuple[float, float] = (0.0, 0.0),
     controller_state: np.ndarray | None = None,
     begin: State | None = None,
@@ -174,7 +185,8 @@ def simulate_law(
         noise: encoder noise in rad, of shape (samples,); None for none.
         effects: from `effects.coefficients`; None for the bare plant.
         elapsed_s: time since the rig was switched on, for what drifts.
-        added_torque: torque beside the controller's, (samples,) in N m; None for none.
+        command: torque command of the drive, (samples,) in N m, beside which the law is an
+            observer whose torque acts at the motor; None where the law makes the command.
         start: position (rad) and velocity (rad/s) of all bodies at the first sample.
         controller_state: state of the law before it, such as the `entering_state` of a record;
             None for zero.
@@ -192,12 +204,12 @@ def simulate_law(
                 controller_state, controller.states, "controller_state", "states"
             )
     reference, noise, out = _prepared(reference, noise, begin)
-    added = np.zeros(reference.size)
-    if added_torque is not None:
-        added = _of_length(added_torque, reference.size, "added_torque", "samples")
+    if command is not None:
+        command = _of_length(command, reference.size, "command", "samples")
+        effects = None if effects is None else effects.copy()  # the observer's torque is put there
     _run_law(
         reference,
-        added,
+        command,
         noise,
         1.0 / sample_rate_hz,
         substeps,

@@ -88,7 +88,7 @@ def play(
     speed = {"stribeck_speed": 1.0, "alpha": 2.0}
     f = tuple(float(friction.get(name, speed.get(name, 0.0))) for name in FRICTION)
     reference = np.ascontiguousarray(drive.reference, float)
-    added = np.zeros(reference.size) if drive.added_torque is None else drive.added_torque
+    added = np.zeros(reference.size) if drive.command is None else drive.command
     x = np.zeros(drive.law.states + 1)
     if drive.entry is not None:
         x[:-1] = drive.entry

@@ -232,7 +232,7 @@ class _Identification:
         b, forward, a, limit = drive.law.coefficients
         step, law = self._mujoco.mj_step, transfer_function.step
         angle, torque, substeps = data.qpos, data.ctrl, self._substeps
-        added = np.zeros(drive.reference.size) if drive.added_torque is None else drive.added_torque
+        added = np.zeros(drive.reference.size) if drive.command is None else drive.command
         position = np.empty(drive.reference.size)
         for k, (r, u) in enumerate(zip(drive.reference.tolist(), added.tolist(), strict=True)):
             y = angle[0]

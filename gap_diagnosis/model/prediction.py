@@ -3,11 +3,13 @@
 Without the controller, or without the reference, the recorded torque drives the model, and a known
 observer holds the motion to the recorded position:
 
-    u_sim = u + L(z) (y - y_sim)
+    y_sim = G (A u + L (y - y_sim))
 
-The true model then has y_sim = y without noise, whatever the controller was; a wrong one has the
-prediction error (1 + G L)^-1 (y - G u). The observer keeps open-loop drift and sticking from
-growing, at a price: below its crossover it hides part of what a wrong model does.
+with the drive A and what follows it, G. The true model then has y_sim = y without noise, whatever
+the controller was; a wrong one has the prediction error (1 + G L)^-1 (y - G A u). The observer
+keeps open-loop drift and sticking from growing, at a price: below its crossover it hides part of
+what a wrong model does. It pushes at the motor, so a delay or a limit of the drive that is tried
+does not make it swing.
 """
 
 from __future__ import annotations

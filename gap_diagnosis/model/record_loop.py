@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from scipy.signal import csd, welch
 
 from controller_node.gains import unknown_gains
 from controller_node.law import as_transfer_function, law_of
@@ -26,6 +27,10 @@ FOLLOWS = 0.98
 GROWS = 20.0
 """Relative change of the simulated motion over that of an inertia, above which the loop is erratic:
 of 16 random rigs of the blind check none exceeds 3.3, loops that swing had a hundred or more."""
+SWINGS = 0.4
+"""Of the motion: where the reference accounts for less, the rig swings by itself. It was at most
+0.12 in one that did, at least 0.67 in 23 other rigs of the blind check."""
+_STRETCHES = 8  # of a run, over which its coherence is averaged
 _SHOWN = 3
 """Most names of runs that a sentence shows."""
 EXACT = 0.9999
@@ -103,13 +108,65 @@ def without_erratic(loop: RecordLoop, names: Sequence[str], growth: Sequence[flo
     erratic = [value > GROWS for value in growth]
     if not any(erratic):
         return loop
-    out = [name for name, grows in zip(names, erratic, strict=True) if grows]
-    where = ", ".join(out) if len(out) <= _SHOWN else f"{len(out)} of {len(names)} runs"
-    laws = tuple(None if grows else law for law, grows in zip(loop.laws, erratic, strict=True))
+    where = _runs_told([name for name, grows in zip(names, erratic, strict=True) if grows], loop)
     note = (
         f"By the datasheet the loop of {where} swings so that small differences grow "
         f"({max(growth):.2g} times), so there the recorded torque drives the model."
     )
+    return _unknown_in(loop, erratic, note)
+
+
+def without_swinging(loop: RecordLoop, records: RecordSet) -> RecordLoop:
+    """Return the loop, not known of the runs in which the rig swings by itself.
+
+    When such a rig is where in its cycle is not the reference's doing, so no loop that is simulated
+    repeats it; but the recorded torque makes the recorded motion as in any run.
+
+    Args:
+        loop: of the records.
+        records: the same.
+    """
+    accounted = [
+        accounted_for(r, records.sample_rate_hz) if law is not None else 1.0
+        for r, law in zip(records.records, loop.laws, strict=True)
+    ]
+    swings = [share < SWINGS for share in accounted]
+    if not any(swings):
+        return loop
+    where = _runs_told(
+        [r.name for r, out in zip(records.records, swings, strict=True) if out], loop
+    )
+    note = (
+        f"The reference accounts for no more than {max(s for s in accounted if s < SWINGS):.0%} of "
+        f"the motion of {where}, which is greater than the reference: the rig swings by itself, so "
+        "there the recorded torque drives the model."
+    )
+    return _unknown_in(loop, swings, note)
+
+
+def accounted_for(record: Record, sample_rate_hz: float) -> float:
+    """Return which share of a motion its reference accounts for, by their coherence.
+
+    It is 1 where the motion is no greater than the reference: what it does not follow may be what
+    friction holds, or rounding.
+    """
+    r, y = record.reference, record.position
+    if r is None or np.std(y) <= np.std(r):
+        return 1.0
+    at = {"fs": sample_rate_hz, "nperseg": max(record.samples // _STRETCHES, 2)}
+    common, power_r, power_y = csd(y, r, **at)[1], welch(r, **at)[1], welch(y, **at)[1]
+    follows = np.abs(common) ** 2 / np.maximum(power_r, 1e-300)
+    return float(follows.sum() / max(power_y.sum(), 1e-300))
+
+
+def _runs_told(names: Sequence[str], loop: RecordLoop) -> str:
+    if len(names) <= _SHOWN:
+        return ", ".join(names)
+    return f"{len(names)} of {len(loop.laws)} runs"
+
+
+def _unknown_in(loop: RecordLoop, out: Sequence[bool], note: str) -> RecordLoop:
+    laws = tuple(None if unknown else law for law, unknown in zip(loop.laws, out, strict=True))
     kind: Loop = loop.kind if any(law is not None for law in laws) else "unknown"
     return replace(loop, kind=kind, laws=laws, notes=(*loop.notes, note))
 

@@ -18,7 +18,7 @@ from fjr_records.records import Record, RecordSet
 from fjr_sim_node.simulation.closed_loop import Trajectory, simulate_law
 
 from .prediction import CROSSOVER_SHARE, model_observer
-from .record_loop import RecordLoop, loop_of, without_erratic
+from .record_loop import RecordLoop, loop_of, without_erratic, without_swinging
 from .simulated_rig import Model, run_parallel, too_stiff
 
 _SMALL = 1e-4  # relative: a change of an inertia that must not grow
@@ -35,7 +35,7 @@ class Drive:
         reference: r of the law, float64 (samples,) in rad: the recorded one, or the recorded
             position where an observer holds the motion to it.
         law: the controller, or the observer.
-        added_torque: recorded torque beside the observer's, (samples,) in N m; None in the loop.
+        command: recorded torque that drives the model, (samples,) in N m; None in the loop.
         start: position (rad) and velocity (rad/s) at the first sample.
         entry: state of the law before it; None for zero.
         elapsed_s: time since the first run began, for what drifts.
@@ -43,7 +43,7 @@ class Drive:
 
     reference: np.ndarray
     law: TransferFunction
-    added_torque: np.ndarray | None
+    command: np.ndarray | None
     start: tuple[float, float]
     entry: np.ndarray | None = None
     elapsed_s: float = 0.0
@@ -51,7 +51,7 @@ class Drive:
     @property
     def observed(self) -> bool:
         """Whether an observer takes the place of a controller that is not known."""
-        return self.added_torque is not None
+        return self.command is not None
 
     def simulated(
         self, sample_rate_hz: float, p: tuple[float, ...], e: np.ndarray | None
@@ -68,7 +68,7 @@ class Drive:
         """
         return simulate_law(
             self.reference, sample_rate_hz, p, self.law, None, e, self.elapsed_s,
-            added_torque=self.added_torque, start=self.start, controller_state=self.entry,
+            command=self.command, start=self.start, controller_state=self.entry,
         )  # fmt: skip
 
 
@@ -97,7 +97,7 @@ class RecordSimulator:
         """
         self.records = records
         self._rate = records.sample_rate_hz
-        self.loop: RecordLoop = loop_of(records)
+        self.loop: RecordLoop = without_swinging(loop_of(records), records)
         self._starts = [_start(r, noise) for r in records.records]
         self._speeds = [float(np.std(np.diff(r.position)) * self._rate) for r in records.records]
         self._torques = [float(np.abs(r.torque).max()) for r in records.records]

@@ -302,5 +302,5 @@ class Simulator:
         speed = (position[1] - position[0]) * self.sample_rate_hz
         return simulate_law(
             position, self.sample_rate_hz, p, self._observer, None, e, elapsed_s,
-            added_torque=torque, start=(float(position[0]), float(speed)), begin=begin,
+            command=torque, start=(float(position[0]), float(speed)), begin=begin,
         )  # fmt: skip

@@ -77,7 +77,7 @@ def test_an_observer_with_the_true_model_follows_the_record_exactly():
     run = closed_loop.simulate(reference, 1000.0, coefficients, PD)
     observer = TransferFunction.of([50.0, -45.0], [1.0, -0.9])
     again = closed_loop.simulate_law(
-        run.position, 1000.0, coefficients, observer, added_torque=run.torque
+        run.position, 1000.0, coefficients, observer, command=run.torque
     )
     assert np.array_equal(again.position, run.position)
     assert np.array_equal(again.torque, run.torque)

@@ -170,7 +170,7 @@ def test_a_record_cut_in_the_middle_is_simulated_on_from_its_states():
     ("arguments", "says"),
     [
         ({"controller_state": np.zeros(7)}, "controller_state must have 4 states"),
-        ({"added_torque": np.zeros(5)}, "added_torque must have 20 samples"),
+        ({"command": np.zeros(5)}, "command must have 20 samples"),
         ({"noise": np.zeros(21)}, "noise must have 20 samples"),
     ],
 )

@@ -132,7 +132,7 @@ def test_torque_into_another_plant_gives_the_position_of_that(domain, tmp_path):
         nothing,
         NOISY["noise_std_rad"] * seed.standard_normal(len(recorded.torque)),
         effects.coefficients(values),
-        added_torque=recorded.torque,
+        command=recorded.torque,
     )
     np.testing.assert_array_equal(simulated.position, expected.position)
     np.testing.assert_array_equal(simulated.torque, recorded.torque)

@@ -195,7 +195,7 @@ def test_a_motion_below_the_least_double_is_simulated():
         plant.coefficients({**nothing, **axis, **effects}),
         TransferFunction.of([16651.48779578, -15063.04760205], [1.0, -0.33257325]),
         effects=fx.coefficients(effects),
-        added_torque=torque,
+        command=torque,
     )
     assert np.isfinite(out.position).all()
 
