@@ -2,9 +2,10 @@
 
 At sample k the encoder gives y = th + noise, the controller answers with u = sat(C_r r - C_y y),
 and u is held to the next sample: the lockstep of the graph. Where the command is given, such as a
-recorded torque, it alone goes through the drive, and the law is an observer that pushes at the
-motor: with the recorded position as its reference it holds the model to the recorded motion, and
-neither a delay nor a limit of the drive that is modelled stands in its way.
+recorded torque, the law is an observer: with the recorded position as its reference it holds the
+model to the recorded motion. Its torque is not late by the delay of a drive, which would make it
+swing; limits and gain of the drive act on it as on the command, for else a drive that lets little
+through would be explained best of all.
 """
 
 from __future__ import annotations
@@ -105,8 +106,9 @@ def _run_law(
         if command is not None:
             u = command[k] + own
         position[k], torque[k], link[k], motor[k] = y, u, state[rig.LINK], state[rig.MOTOR]
-        if e is not None and command is not None and e[fx.DRIVE_ON] != 0.0:
-            e[fx.TORQUE_BIAS_TORQUE_NM] = past + own
+        if e is not None and command is not None and e[fx.DELAY_TIME_S] != 0.0:
+            more = rig.asked(u, e) - rig.asked(command[k], e)
+            e[fx.TORQUE_BIAS_TORQUE_NM] = past + more * (1.0 + e[fx.TORQUE_GAIN_RELATIVE_ERROR])
             u = command[k]
         for _ in range(substeps):
             rig.hold(state, u, sample_period / substeps, p, e)
@@ -186,7 +188,7 @@ def simulate_law(
         effects: from `effects.coefficients`; None for the bare plant.
         elapsed_s: time since the rig was switched on, for what drifts.
         command: torque command of the drive, (samples,) in N m, beside which the law is an
-            observer whose torque acts at the motor; None where the law makes the command.
+            observer whose torque no delay holds up; None where the law makes the command.
         start: position (rad) and velocity (rad/s) of all bodies at the first sample.
         controller_state: state of the law before it, such as the `entering_state` of a record;
             None for zero.

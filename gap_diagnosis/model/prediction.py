@@ -3,13 +3,13 @@
 Without the controller, or without the reference, the recorded torque drives the model, and a known
 observer holds the motion to the recorded position:
 
-    y_sim = G (A u + L (y - y_sim))
+    y_sim = G (D u + L (y - y_sim))
 
-with the drive A and what follows it, G. The true model then has y_sim = y without noise, whatever
-the controller was; a wrong one has the prediction error (1 + G L)^-1 (y - G A u). The observer
-keeps open-loop drift and sticking from growing, at a price: below its crossover it hides part of
-what a wrong model does. It pushes at the motor, so a delay or a limit of the drive that is tried
-does not make it swing.
+with the delay of the drive, D, and all that follows it, G. The true model then has y_sim = y
+without noise, whatever the controller was; a wrong one has the prediction error
+(1 + G L)^-1 (y - G D u). The observer keeps open-loop drift and sticking from growing, at a price:
+below its crossover it hides part of what a wrong model does. A delay that is tried does not make it
+swing, since it is not late by it; what else a drive does to the torque, it does to the observer's.
 """
 
 from __future__ import annotations

@@ -41,7 +41,7 @@ def test_the_loop_of_a_rig_that_follows_is_simulated():
     assert accounted_for(at_rest, RATE) == 1.0
 
 
-def test_an_observer_holds_a_model_whatever_delay_or_limit_its_drive_is_given(swinging):
+def test_an_observer_holds_a_model_whatever_delay_its_drive_is_given(swinging):
     """A delay that is a little longer is a little wrong, in proportion, and makes nothing swing."""
     evidence = Evidence(swinging, NOMINAL)
     errors = {}
