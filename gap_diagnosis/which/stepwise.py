@@ -143,8 +143,15 @@ class Stepwise:
             *found.rivals.get(len(best.effects) + 1, []), *fits
         ]  # fmt: skip
         least = self._least_closed(found)
-        closing = [f for f in fits if closed(self._fitter, f, best) >= least]
-        return self._chosen(closing, best)
+        return self._chosen([f for f in fits if self._closes(f, best) >= least], best)
+
+    def _closes(self, fit: CellFit, before: CellFit) -> float:
+        """Return how much a fit closes of the band in which it gains most, or of all if more.
+
+        What closes nearly all of a slow error may gain most where little but noise is, by many
+        lines that each become a little better.
+        """
+        return max(closed(self._fitter, fit, before), 1.0 - left_of(self._fitter, fit, before))
 
     @property
     def _over(self) -> bool:

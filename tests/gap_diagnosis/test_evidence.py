@@ -298,3 +298,23 @@ def test_lines_of_a_single_run_count_as_its_parts_differ():
     factor = rng.standard_normal(len(one.evidence.parts))[one.evidence.part_of(one.fit_parts)]
     assert np.unique(one.weights.coherence(factor)) == [4.0]
     assert np.unique(three.weights.coherence(rng.standard_normal(three.runs.size))) == [4.0]
+
+
+def test_what_closes_nearly_all_is_tried_though_it_gains_most_where_noise_is():
+    """Many lines at the noise, each a little better, gain more than one slow error that is gone."""
+    fitter, refit, fit = biased()
+    noise, counts = NOISE**2, fitter.weights.counts
+    left = np.full(counts.shape, 1e4 * noise)
+    many = int(np.argmax(counts.sum(axis=0)))
+    left[:, many] = 1.25 * noise
+    after = left.copy()
+    after[:, many], after[:, 0] = noise, 1e3 * noise
+    before, after_it = replace(refit, left=left), replace(fit, left=after)
+    small = np.ones(counts.shape[1], bool)
+    small[[0, many]] = False
+    before.left[:, small] = after_it.left[:, small] = noise
+    gained = fitter.weights.gained(after_it.left, before.left).sum(axis=0)
+    assert np.argmax(gained) == many
+    assert closed(fitter, after_it, before) < LEAST_CLOSED
+    search = Stepwise(fitter, [], lambda _: None, np.inf)
+    assert search._closes(after_it, before) > 0.8
