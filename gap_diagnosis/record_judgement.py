@@ -112,14 +112,13 @@ class Tested:
     def present(self) -> float:
         """Probability that it is there.
 
-        A cause that closes little of what is left without it, and little even in the band where it
-        gains most, may be a part of what no effect explains. Of 11 causes of the blind checks 307
-        to 311 that closed less than a quarter of what was left, 6 were right, stated at 0.79 in the
-        mean.
+        A cause that closes little of the gap, and little even in the band where it gains most, may
+        be a part of what no effect explains. Of 11 causes of the blind checks 307 to 311 that
+        closed less than a quarter of what was left, 6 were right, stated at 0.79 in the mean.
         """
         sure = (1.0 - min(1.0, 5.0 * self.gain.p)) * min(1.0, self.gain.share + 0.1)
-        surely = self.share.low if self.share.low is not None and self.share.low > 0.0 else 0.0
-        closed = max(self.in_band, surely / max(surely + self.left, 1e-300), 0.0)
+        of_all = self.share.low if self.share.low is not None and self.share.low > 0.0 else 0.0
+        closed = max(self.in_band, of_all, 0.0)
         sure *= closed / (closed + _DOUBTED * (1.0 - closed))
         share = max(0.0, self.share.value)
         beside_left = share / max(share + self.left, 1e-300)
