@@ -4,8 +4,8 @@ At sample k the encoder gives y = th + noise, the controller answers with u = sa
 and u is held to the next sample: the lockstep of the graph. Where the command is given, such as a
 recorded torque, the law is an observer: with the recorded position as its reference it holds the
 model to the recorded motion. Its torque is not late by the delay of a drive, which would make it
-swing; limits and gain of the drive act on it as on the command, for else a drive that lets little
-through would be explained best of all.
+swing; what else a drive does to a torque it does to that one (but for a slew limit beside a delay),
+for else a drive that lets little through would be explained best of all.
 """
 
 from __future__ import annotations
@@ -22,7 +22,6 @@ from fjr_interface.topics import Signal
 from fjr_kit.compiled import jit
 from fjr_kit.errors import InputError
 
-from .. import effects as fx
 from . import rig
 
 
@@ -96,22 +95,16 @@ def _run_law(
     position, torque, link, motor,
 ):  # fmt: skip
     b, forward, a, limit = law
-    past = 0.0
-    if e is not None:
-        past = e[fx.TORQUE_BIAS_TORQUE_NM]
     for k in range(reference.size):
         y = rig.measure(state, noise[k], e)
         own = transfer_function.step(x, reference[k], y, b, forward, a, limit)
-        u = own
+        u, prompt = own, 0.0
         if command is not None:
-            u = command[k] + own
-        position[k], torque[k], link[k], motor[k] = y, u, state[rig.LINK], state[rig.MOTOR]
-        if e is not None and command is not None and e[fx.DELAY_TIME_S] != 0.0:
-            more = rig.asked(u, e) - rig.asked(command[k], e)
-            e[fx.TORQUE_BIAS_TORQUE_NM] = past + more * (1.0 + e[fx.TORQUE_GAIN_RELATIVE_ERROR])
-            u = command[k]
+            u, prompt = command[k], own
+        position[k], torque[k] = y, u + prompt
+        link[k], motor[k] = state[rig.LINK], state[rig.MOTOR]
         for _ in range(substeps):
-            rig.hold(state, u, sample_period / substeps, p, e)
+            rig.hold(state, u, sample_period / substeps, p, e, prompt)
 
 
 def simulate(
@@ -208,7 +201,6 @@ def simulate_law(
     reference, noise, out = _prepared(reference, noise, begin)
     if command is not None:
         command = _of_length(command, reference.size, "command", "samples")
-        effects = None if effects is None else effects.copy()  # the observer's torque is put there
     _run_law(
         reference,
         command,

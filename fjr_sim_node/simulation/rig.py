@@ -121,7 +121,7 @@ def driven(x, command, sample_period, e):
 
 
 @jit
-def hold(x, command, sample_period, p, e):
+def hold(x, command, sample_period, p, e, prompt=0.0):
     """Advance the rig in place by one sample period under a held torque command.
 
     A torque that slews is no held torque: it is followed in parts for as long as it slews.
@@ -132,10 +132,18 @@ def hold(x, command, sample_period, p, e):
         sample_period: Ts (s).
         p: bare parameters, `plant.coefficients`.
         e: effects, `effects.coefficients`, or None.
+        prompt: torque (N m) beside the command that no delay holds up, such as an observer's.
     """
     if e is None:
-        x[0], x[1], x[2], x[3] = advance(x[0], x[1], x[2], x[3], command, sample_period, p)
+        u = command + prompt
+        x[0], x[1], x[2], x[3] = advance(x[0], x[1], x[2], x[3], u, sample_period, p)
         return
+    more = 0.0
+    if e[fx.DELAY_TIME_S] == 0.0:
+        command += prompt
+    elif prompt != 0.0:
+        more = asked(command + prompt, e) - asked(command, e)
+        more *= 1.0 + e[fx.TORQUE_GAIN_RELATIVE_ERROR]
     slewing = 0.0
     if e[fx.TORQUE_SLEW_LIMIT_LIMIT_NM_S] != math.inf:
         most = e[fx.TORQUE_SLEW_LIMIT_LIMIT_NM_S] * sample_period
@@ -143,17 +151,17 @@ def hold(x, command, sample_period, p, e):
         if e[fx.DELAY_TIME_S] != 0.0:  # what is remembered must lie evenly in time
             slewing = 1.0
     if not slewing > _AT_ONCE:
-        _hold_with_effects(x, command, sample_period, p, e)
+        _hold_with_effects(x, command, more, sample_period, p, e)
         return
     parts = math.ceil(_SLEW_PARTS * slewing)
     for _ in range(parts):
-        _hold_with_effects(x, command, slewing * sample_period / parts, p, e)
+        _hold_with_effects(x, command, more, slewing * sample_period / parts, p, e)
     if slewing < 1.0:
-        _hold_with_effects(x, command, (1.0 - slewing) * sample_period, p, e)
+        _hold_with_effects(x, command, more, (1.0 - slewing) * sample_period, p, e)
 
 
 @jit
-def _hold_with_effects(x, command, sample_period, p, e):
+def _hold_with_effects(x, command, more, sample_period, p, e):
     torque = driven(x, command, sample_period, e)
     friction = max(1.0 + e[fx.NONSTATIONARY_FRICTION_PER_S] * x[_TIME], 0.0)
     x[_TIME] += sample_period
@@ -172,5 +180,5 @@ def _hold_with_effects(x, command, sample_period, p, e):
     now = x[_RING + (head - whole) % _RING_SIZE]
     late = max(samples - whole, 0.0) * sample_period
     if late > 0.0:
-        advance_with_effects(x, before, late, p, e, friction)
-    advance_with_effects(x, now, sample_period - late, p, e, friction)
+        advance_with_effects(x, before + more, late, p, e, friction)
+    advance_with_effects(x, now + more, sample_period - late, p, e, friction)
