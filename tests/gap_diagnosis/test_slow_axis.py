@@ -48,7 +48,7 @@ def moved(seed: int) -> RecordSet:
     return RecordSet("axis", RATE, tuple(runs))
 
 
-def test_gravity_that_closes_nearly_all_is_named_though_it_gains_most_where_noise_is():
+def test_gravity_is_named_beside_coulomb_friction():
     found = investigate_records(moved(30), datasheet({"jm": 2.2}, "axis"), effects=LOOKED_FOR)
     sizes = {n: v for cause in found.diagnosis.causes for n, v in cause.parameters.items()}
     named = {cause.effect: cause.present for cause in found.diagnosis.causes}
