@@ -91,7 +91,7 @@ def _run(reference, noise, sample_period, p, e, c, x, state, position, torque, l
 
 @jit
 def _run_law(
-    reference, command, noise, sample_period, substeps, p, e, x, law, state,
+    reference, command, added, noise, sample_period, substeps, p, e, x, law, state,
     position, torque, link, motor,
 ):  # fmt: skip
     b, forward, a, limit = law
@@ -101,6 +101,8 @@ def _run_law(
         u, prompt = own, 0.0
         if command is not None:
             u, prompt = command[k], own
+        elif added is not None:
+            u = own + added[k]
         position[k], torque[k] = y, u + prompt
         link[k], motor[k] = state[rig.LINK], state[rig.MOTOR]
         for _ in range(substeps):
@@ -165,6 +167,7 @@ def simulate_law(
     elapsed_s: float = 0.0,
     *,
     command: np.ndarray | None = None,
+    added: np.ndarray | None = None,
     start: tuple[float, float] = (0.0, 0.0),
     controller_state: np.ndarray | None = None,
     begin: State | None = None,
@@ -182,6 +185,7 @@ def simulate_law(
         elapsed_s: time since the rig was switched on, for what drifts.
         command: torque command of the drive, (samples,) in N m, beside which the law is an
             observer whose torque no delay holds up; None where the law makes the command.
+        added: torque that a controller commands beside its law, (samples,) in N m; None for none.
         start: position (rad) and velocity (rad/s) of all bodies at the first sample.
         controller_state: state of the law before it, such as the `entering_state` of a record;
             None for zero.
@@ -201,9 +205,12 @@ def simulate_law(
     reference, noise, out = _prepared(reference, noise, begin)
     if command is not None:
         command = _of_length(command, reference.size, "command", "samples")
+    if added is not None:
+        added = _of_length(added, reference.size, "added", "samples")
     _run_law(
         reference,
         command,
+        added,
         noise,
         1.0 / sample_rate_hz,
         substeps,

@@ -157,7 +157,7 @@ class QuasiStaticSimulator:
     def __init__(self, found: Stations) -> None:
         """Take the stations."""
         self._found, self._records = found, found.records.records
-        self.loop = RecordLoop("unknown", (None,) * len(self._records))
+        self.loop = RecordLoop.unknown(len(self._records))
         self.crossover_hz = found.records.sample_rate_hz / 8.0
         torque = np.mean([np.mean(r.torque**2) for r in self._records])
         motion = np.mean([np.var(r.position) for r in self._records])

@@ -1,7 +1,9 @@
 """Which loop a set of records was driven by: known, known but for gains that it shows, or unknown.
 
 The torque is recorded, so a described controller can be checked: played with the recorded reference
-and position it must make the recorded torque. Unknown gains are solved from the same.
+and position it must make the recorded torque. Unknown gains are solved from the same. What it does
+not make, such as a feed-forward or a filter that nobody described, is known then, and is added to
+the loop: where the model moves as the rig did, its controller makes the recorded torque.
 """
 
 from __future__ import annotations
@@ -34,7 +36,10 @@ _STRETCHES = 8  # of a run, over which its coherence is averaged
 _SHOWN = 3
 """Most names of runs that a sentence shows."""
 EXACT = 0.9999
-"""Share below which a reader is told that the controller is not the whole truth."""
+"""Share below which a described controller is not the whole truth."""
+_GOES_WITH = 0.3
+"""Coherent share of a torque with reference or position above which a controller made it; noise
+has about 0.1 by chance."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +49,8 @@ class RecordLoop:
     Attributes:
         kind: whether it can be simulated in any of them, with gains that were known or solved for.
         laws: the law of each record; None where it is not known, or does not make the torque.
+        added: the torque of each record that its controller made beside its law, (samples,) in
+            N m; None where that is nothing.
         notes: sentences on what was found.
         commanded: whether a described controller makes the torque of all of them: then it is a
             command, held from sample to sample, also where it drives the model.
@@ -51,8 +58,14 @@ class RecordLoop:
 
     kind: Loop
     laws: tuple[TransferFunction | None, ...]
+    added: tuple[np.ndarray | None, ...]
     notes: tuple[str, ...] = ()
     commanded: bool = False
+
+    @classmethod
+    def unknown(cls, runs: int) -> RecordLoop:
+        """Return the loop of runs whose controller nobody knows."""
+        return cls("unknown", (None,) * runs, (None,) * runs)
 
 
 def loop_of(records: RecordSet) -> RecordLoop:
@@ -67,7 +80,7 @@ def loop_of(records: RecordSet) -> RecordLoop:
     runs, rate = records.records, records.sample_rate_hz
     described = [r for r in runs if r.reference is not None and r.controller]
     if not described:
-        return RecordLoop("unknown", (None,) * len(runs))
+        return RecordLoop.unknown(len(runs))
     solved = [r for r in described if unknown_gains(r.controller)]
     notes: list[str] = []
     gains: dict[str, dict[str, float]] = {}
@@ -83,15 +96,17 @@ def loop_of(records: RecordSet) -> RecordLoop:
     notes += _gains_told({name: found for name, found in gains.items() if name in follow})
     if len(follow) < len(described):
         notes.append(_not_followed(shares, len(runs)))
-    worst = min((shares[name] for name in follow), default=1.0)
-    if worst < EXACT:
-        notes.append(
-            f"The described controller makes {worst:.2%} of the recorded torque's variance, not "
-            "all of it: the rest of the controller is part of the gap."
-        )
+    added = {
+        r.name: _beside(laws[r.name], r, rate)
+        for r in described
+        if r.name in follow and shares[r.name] < EXACT
+    }
+    if added:
+        notes.append(_rest_told(min(shares[name] for name in added), list(added.values())))
     kind: Loop = "unknown" if not follow else "gains_fitted" if gains else "known"
     chosen = tuple(laws[r.name] if r.name in follow else None for r in runs)
-    return RecordLoop(kind, chosen, tuple(notes), len(follow) == len(runs))
+    beside = tuple(added.get(r.name) for r in runs)
+    return RecordLoop(kind, chosen, beside, tuple(notes), len(follow) == len(runs))
 
 
 def without_erratic(loop: RecordLoop, names: Sequence[str], growth: Sequence[float]) -> RecordLoop:
@@ -151,12 +166,36 @@ def accounted_for(record: Record, sample_rate_hz: float) -> float:
     friction holds, or rounding.
     """
     r, y = record.reference, record.position
-    if r is None or np.std(y) <= np.std(r):
-        return 1.0
-    at = {"fs": sample_rate_hz, "nperseg": max(record.samples // _STRETCHES, 2)}
-    common, power_r, power_y = csd(y, r, **at)[1], welch(r, **at)[1], welch(y, **at)[1]
-    follows = np.abs(common) ** 2 / np.maximum(power_r, 1e-300)
-    return float(follows.sum() / max(power_y.sum(), 1e-300))
+    return 1.0 if r is None or np.std(y) <= np.std(r) else _coherent_share(y, r, sample_rate_hz)
+
+
+def _coherent_share(signal: np.ndarray, other: np.ndarray, sample_rate_hz: float) -> float:
+    """Return the share of a signal's power that goes with another signal, by their coherence."""
+    at = {"fs": sample_rate_hz, "nperseg": max(signal.size // _STRETCHES, 2)}
+    common, power = csd(signal, other, **at)[1], welch(signal, **at)[1]
+    follows = np.abs(common) ** 2 / np.maximum(welch(other, **at)[1], 1e-300)
+    return float(follows.sum() / max(power.sum(), 1e-300))
+
+
+def _beside(law: TransferFunction, record: Record, sample_rate_hz: float) -> np.ndarray | None:
+    """Return the recorded torque that a law does not make; None if that is noise of a sensor."""
+    assert record.reference is not None
+    rest = not_made(law, record)
+    signals = (record.reference, record.position)
+    made = max(_coherent_share(rest, signal, sample_rate_hz) for signal in signals)
+    return rest if made > _GOES_WITH else None
+
+
+def _rest_told(worst: float, added: Sequence[np.ndarray | None]) -> str:
+    """Return the sentence on a controller that makes most of the torque, but not all."""
+    if all(rest is None for rest in added):
+        what = "the rest goes neither with reference nor with position, as noise of a sensor does"
+    else:
+        what = (
+            "the rest goes with reference or position, so it is of the controller as well, and is "
+            "added to the loop as it was recorded"
+        )
+    return f"The described controller makes {worst:.2%} of the recorded torque's variance; {what}."
 
 
 def _runs_told(names: Sequence[str], loop: RecordLoop) -> str:
@@ -205,11 +244,15 @@ def _not_followed(shares: Mapping[str, float], runs: int) -> str:
 
 def explained(law: TransferFunction, record: Record) -> float:
     """Return the share of the variance of a recorded torque that a law makes of r and y."""
+    return 1.0 - float(np.var(not_made(law, record)) / max(np.var(record.torque), 1e-300))
+
+
+def not_made(law: TransferFunction, record: Record) -> np.ndarray:
+    """Return the recorded torque less the one that a law makes of r and y, (samples,) in N m."""
     assert record.reference is not None
     state = law.entering_state(record.reference, record.position, record.torque)
     made = law.unlimited(record.reference, record.position, state)
-    made = np.clip(made, -law.limit_nm, law.limit_nm)
-    return 1.0 - float(np.var(record.torque - made) / max(np.var(record.torque), 1e-300))
+    return record.torque - np.clip(made, -law.limit_nm, law.limit_nm)
 
 
 def _solved(runs: Sequence[Record], rate: float) -> dict[str, float]:

@@ -36,6 +36,7 @@ class Drive:
             position where an observer holds the motion to it.
         law: the controller, or the observer.
         command: recorded torque that drives the model, (samples,) in N m; None in the loop.
+        added: recorded torque that the law does not make, likewise; None where it makes all.
         start: position (rad) and velocity (rad/s) at the first sample.
         entry: state of the law before it; None for zero.
         elapsed_s: time since the first run began, for what drifts.
@@ -47,6 +48,7 @@ class Drive:
     start: tuple[float, float]
     entry: np.ndarray | None = None
     elapsed_s: float = 0.0
+    added: np.ndarray | None = None
 
     @property
     def observed(self) -> bool:
@@ -68,7 +70,7 @@ class Drive:
         """
         return simulate_law(
             self.reference, sample_rate_hz, p, self.law, None, e, self.elapsed_s,
-            command=self.command, start=self.start, controller_state=self.entry,
+            command=self.command, added=self.added, start=self.start, controller_state=self.entry,
         )  # fmt: skip
 
 
@@ -104,14 +106,17 @@ class RecordSimulator:
         self.crossover_hz, self._observer = model_observer(
             nominal, CROSSOVER_SHARE * top_hz, self._rate
         )
-        self._entries = [
-            law.entering_state(r.reference, r.position, r.torque)
-            if law is not None and r.reference is not None and start != (0.0, 0.0)
-            else None
-            for law, r, start in zip(self.loop.laws, records.records, self._starts, strict=True)
-        ]
+        self._entries = [self._entry(index) for index in range(len(records.records))]
         names = [r.name for r in records.records]
         self.loop = without_erratic(self.loop, names, self._growth(Model.nominal(nominal)))
+
+    def _entry(self, index: int) -> np.ndarray | None:
+        """Return the state in which the law of a run enters it; None for zero."""
+        law, record = self.loop.laws[index], self.records.records[index]
+        rests = self._starts[index] == (0.0, 0.0) and self.loop.added[index] is None
+        if law is None or record.reference is None or rests:
+            return None
+        return law.entering_state(record.reference, record.position, record.torque)
 
     def _growth(self, nominal: Model) -> list[float]:
         """Return how a small change of the inertia grows in each run, see `GROWS`."""
@@ -168,7 +173,8 @@ class RecordSimulator:
             return self._observed(index)
         assert record.reference is not None
         start, entry = self._starts[index], self._entries[index]
-        return Drive(record.reference, law, None, start, entry, record.elapsed_s)
+        added = self.loop.added[index]
+        return Drive(record.reference, law, None, start, entry, record.elapsed_s, added)
 
     def _observed(self, index: int) -> Drive:
         record = self.records.records[index]

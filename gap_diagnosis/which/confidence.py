@@ -2,8 +2,8 @@
 
 One regression for each kind of verdict, on a few figures of the ranking. The coefficients are not
 set by hand: they were fitted, with a weak prior, to 240 blind cases whose answers are open, those
-of the seeds 102 (48), 103 (72) and 105 (120) of the check that docs/blind/one_rig.md reports; so few were
-missed that the prior still counts.
+of the seeds 102 (48), 103 (72) and 105 (120) of the check that docs/blind/one_rig.md reports; so
+few were missed that the prior still counts.
 """
 
 from __future__ import annotations

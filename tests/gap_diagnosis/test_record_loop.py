@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -85,3 +87,38 @@ def test_a_model_too_stiff_to_be_played_in_time_is_passed_over():
     evidence = Evidence(RecordSet("test", RATE, (record(0, 300.0, None),)), NOMINAL)
     stiff = Model(NOMINAL, {"cogging.amplitude_nm": 1e6, "cogging.cycles_per_turn": 1e4})
     assert np.isnan(evidence.simulator.run([stiff], [0])[0][0]).all()
+
+
+def filtered(number: int, torque_noise: float) -> Record:
+    """Return a run whose description lacks the filter of its controller's derivative.
+
+    Or has it, and the torque is measured with noise, relative to its rms.
+    """
+    whole = record(number, 300.0, {"kind": "pd", "p": 300.0, "d": 60.0, "n": 200.0})
+    if torque_noise:
+        noise = np.random.default_rng(number + 10).standard_normal(whole.samples)
+        torque = whole.torque + torque_noise * np.std(whole.torque) * noise
+        return replace(whole, torque=torque)
+    bare = {"kind": "pd", "p": None, "d": None, "unknown": ["p", "d"]}
+    return replace(whole, description=whole.description.model_copy(update={"controller": bare}))
+
+
+def test_a_controller_that_is_described_but_in_part_makes_the_recorded_motion():
+    """Its other part is known as well: it is the torque that the described one does not make."""
+    runs = tuple(filtered(n, 0.0) for n in range(2))
+    evidence = Evidence(RecordSet("test", RATE, runs), NOMINAL)
+    loop = evidence.simulator.loop
+    assert loop.kind == "gains_fitted" and all(rest is not None for rest in loop.added)
+    assert "is added to the loop as it was recorded" in loop.notes[-1]
+    (played, _), run = evidence.simulator.run([Model.nominal(NOMINAL)], range(2))[0], runs[0]
+    assert np.abs(played[0] - run.position).max() < 1e-3 * np.abs(run.position).max()
+    law, start = loop.laws[0], {"start": (0.0, 0.0)}
+    alone = closed_loop.simulate_law(run.reference, RATE, plant.coefficients(NOMINAL), law, **start)
+    assert np.abs(alone.position - run.position).max() > 1e-2 * np.abs(run.position).max()
+
+
+def test_noise_of_a_torque_sensor_is_not_added_to_the_loop():
+    runs = tuple(filtered(n, 0.03) for n in range(2))
+    loop = loop_of(RecordSet("test", RATE, runs))
+    assert loop.kind == "known" and loop.added == (None, None)
+    assert "as noise of a sensor does" in loop.notes[-1]
