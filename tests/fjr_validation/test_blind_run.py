@@ -23,7 +23,8 @@ from fjr_validation.blind.report import score_check, score_together
 from fjr_validation.blind.score import Scores
 from fjr_validation.blind.seal import Secret, decrypt, encrypt, opened_line, sealed_line
 
-SEED, CASES = 203, {"closed": 2}
+SEED, CASES = 523, {"closed": 2}
+"""A seed whose first cases are short records at low rates, so that they are soon made."""
 
 
 @pytest.fixture(scope="module")

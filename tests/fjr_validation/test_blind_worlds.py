@@ -38,6 +38,8 @@ EARLIER = {"nonlinear_absorber", "synchronous_disturbance", "frictional_memory",
            "rate_limited_drive", "angle_dependent_stiffness", "drive_dead_band",
            "posture_dependent_inertia"}  # fmt: skip
 """Laws outside the catalogue of earlier checks."""
+SHORT = {"closed": 33, "open": 4, "records": 35}
+"""Cases of flexible rigs with one or two causes, in short records at low rates."""
 
 
 @settings(max_examples=25, deadline=None)
@@ -211,7 +213,8 @@ def test_a_large_change_that_a_refit_takes_over_is_left_to_it_however_far_it_ben
 @pytest.mark.slow
 @pytest.mark.parametrize("world", WORLDS)
 def test_a_case_is_made_again_from_its_number_and_reads_as_an_experiment(world, tmp_path):
-    answers = [make_case(202, 3, world, tmp_path / name) for name in ("one", "two")]
+    number = SHORT[world]
+    answers = [make_case(202, number, world, tmp_path / name) for name in ("one", "two")]
     assert answers[0] == answers[1]
     files = [sorted((tmp_path / name).rglob("*.mcap")) for name in ("one", "two")]
     assert [f.read_bytes() for f in files[0]] == [f.read_bytes() for f in files[1]]
@@ -229,4 +232,4 @@ def test_a_case_is_made_again_from_its_number_and_reads_as_an_experiment(world, 
     assert len(list((tmp_path / "one").glob("level_*"))) == answer.facts["runs"]
     if world != "records":
         assert len(open_experiment(tmp_path / "one").bags) == answer.facts["runs"]
-    assert answer.world == world and answer.kind == kind_of(202, 3, world)
+    assert answer.world == world and answer.kind == kind_of(202, number, world)
