@@ -123,6 +123,7 @@ class Rig:
         effects: effect parameters by full name.
         x: state: q, vq, th, vth, q3, v3, lagged torque, presliding torque of link and motor,
             hysteresis, angle at which a cable pulls nowhere.
+        get: returns an effect parameter by its full name.
     """
 
     plant: dict[str, float] = field(default_factory=dict)
@@ -135,6 +136,8 @@ class Rig:
         self.one_body = plant.moves_as_one(given)
         self.p = plant.coefficients(given)
         self.e = effects.coefficients(self.effects)
+        sizes = effects.DEFAULTS if self.e is None else self.e
+        self.get = dict(zip(effects.NAMES, map(float, sizes), strict=False)).__getitem__
 
     def start(self, q=0.0, vq=0.0, th=0.0, vth=0.0) -> Rig:
         """Set the motion of the two bodies."""
@@ -154,10 +157,8 @@ class Rig:
 
     def energy(self) -> float:
         """Return kinetic energy and what all springs and fields hold (J)."""
-        v = self.values
-        e = effects.DEFAULTS if self.e is None else self.e
-        get = dict(zip(effects.NAMES, e, strict=False)).__getitem__
-        q, vq, th, vth, q3, v3, _, link, motor, flex, slack = self.x[:11]
+        v, get = self.values, self.get
+        q, vq, th, vth, q3, v3, _, link, motor, flex, slack = self.x[:11].tolist()
         if self.one_body:
             q, vq, v = th, vth, {**v, "k0": 0.0, "k1": 0.0}
         rate = 2.0 * math.pi * get("extra_mode.frequency_hz")
@@ -211,10 +212,10 @@ class Rig:
 
     def work(self, torque: float) -> float:
         """Return the work that a held command has done at the present motor angle (J)."""
-        get = {**dict(zip(effects.NAMES, effects.DEFAULTS, strict=True)), **self.effects}.get
+        get = self.get
         given = math.copysign(max(abs(torque) - get("dead_band.width_nm"), 0.0), torque)
         given *= 1.0 + get("torque_gain.relative_error")
-        th, cycles = self.x[2], get("torque_constant_ripple.cycles_per_turn")
+        th, cycles = float(self.x[2]), get("torque_constant_ripple.cycles_per_turn")
         angle = cycles * th + get("torque_constant_ripple.phase_rad")
         second = get("torque_constant_ripple.second_ratio") / 2.0
         turned = -math.cos(angle) - second * math.cos(

@@ -60,7 +60,7 @@ class EventDrivenPlant:
         return math.copysign(1.0, load) if abs(load) > level else 0.0
 
     def derivative(self, state, torque, modes):
-        """Return d(state)/dt in fixed modes."""
+        """Return d(state)/dt in fixed modes; numbers of a list are faster here than an array's."""
         v = self.values
         link, motor = self.loads(state, torque)
         link_acceleration = (link - v["fv"] * state[1] - v["fs"] * modes[0]) / v["j"]
@@ -96,40 +96,40 @@ class EventDrivenPlant:
     def _quiet(self, torque, modes, duration):
         """Return the end state if no margin comes near zero on the way, else None (cheap)."""
         before = self.margins(self.state, torque, modes)
-        solver = ode(lambda _t, x: self.derivative(x, torque, modes))
+        solver = ode(lambda _t, x: self.derivative(x.tolist(), torque, modes))
         solver.set_integrator("dop853", rtol=self.rtol, atol=ATOL, first_step=duration)
         solver.set_initial_value(self.state, 0.0)
         for part in (0.5, 1.0):
-            state = solver.integrate(part * duration)
+            state = solver.integrate(part * duration).tolist()
             after = self.margins(state, torque, modes)
             if not solver.successful() or any(
                 min(a, b) <= 0.5 * abs(a - b) for a, b in zip(before, after, strict=True)
             ):
                 return None
             before = after
-        return [float(value) for value in state]
+        return state
 
     def _to_event(self, torque, modes, duration):
         """Advance to the next event or the end, whatever comes first; return the time taken."""
 
         def watch(side):
             def margin(_t, x):
-                return self.margins(x, torque, modes)[side]
+                return self.margins(x.tolist(), torque, modes)[side]
 
             margin.terminal, margin.direction = True, -1
             return margin
 
         solution = solve_ivp(
-            lambda _t, x: self.derivative(x, torque, modes),
+            lambda _t, x: self.derivative(x.tolist(), torque, modes),
             (0.0, duration),
-            self.state,
+            np.array(self.state),
             method=self.method,
             rtol=self.rtol,
             atol=ATOL,
             max_step=duration / self.parts,
             events=[watch(0), watch(1)],
         )
-        self.state = [float(value) for value in solution.y[:, -1]]
+        self.state = solution.y[:, -1].tolist()
         for side in (0, 1):
             if solution.t_events[side].size:
                 self._apply_event(side, modes[side], torque)
