@@ -8,6 +8,8 @@ from collections import Counter
 from pathlib import Path
 
 from bag_tools import MS, WHOLE, foreign_bag, rig_streams, serialize
+from mcap.data_stream import RecordBuilder
+from mcap.records import Message
 from mcap.writer import CompressionType, IndexType
 from mcap.writer import Writer as LibraryWriter
 from rosbags.rosbag2 import StoragePlugin
@@ -21,21 +23,41 @@ STRANGE = "strange_msgs/msg/Strange"
 SIGNAL = serialize(MS, "", ["joint"], position=[1.0], effort=[1.0])
 
 
+def add_empty_messages(writer: LibraryWriter, channel: int, count: int) -> None:
+    """Add messages without a payload to the chunk under way, all at once: millions are soon added.
+
+    The library adds each by itself, so this does what it does, by its private names.
+    """
+    one = RecordBuilder()
+    Message(channel_id=channel, log_time=0, data=b"", publish_time=0, sequence=0).write(one)
+    chunk, statistics = writer._Writer__chunk_builder, writer._Writer__statistics
+    chunk.record_writer.write(one.end() * count)
+    chunk.num_messages += count
+    statistics.channel_message_counts[channel] += count
+    statistics.message_count += count
+    chunk.message_start_time = statistics.message_start_time = 0
+
+
 def mcap_bag(
     folder: Path,
     messages: list[tuple[str, int, bytes]],
     definition: tuple[str, str, str],
+    empty: int = 0,
     **options,
 ) -> Path:
-    """Write messages (topic, time, payload) of one type: its name, its encoding and definition."""
+    """Write messages (topic, time, payload) of one type: its name, its encoding and definition.
+
+    Then as many without a payload as `empty` says, on the topic of the first.
+    """
     bag = folder / "bag"
     bag.mkdir()
     counts = Counter(topic for topic, _, _ in messages)
+    counts[messages[0][0]] += empty
     information = {
         "version": 9,
         "storage_identifier": "mcap",
         "relative_file_paths": ["bag.mcap"],
-        "message_count": len(messages),
+        "message_count": len(messages) + empty,
         "topics_with_message_count": [
             {"message_count": count, "topic_metadata": {"name": topic, "type": definition[0]}}
             for topic, count in counts.items()
@@ -51,6 +73,8 @@ def mcap_bag(
         channels = {topic: writer.register_channel(topic, "cdr", schema) for topic in counts}
         for topic, time, payload in messages:
             writer.add_message(channels[topic], time, payload, time)
+        if empty:
+            add_empty_messages(writer, channels[messages[0][0]], empty)
         writer.finish()
     return bag
 
@@ -97,22 +121,23 @@ def fields(folder: Path) -> Path:
 
 def tiny_messages(folder: Path) -> Path:
     """31 bytes each, 100 MB unpacked in one chunk, without an index, on a topic of no interest."""
-    return beside_signals(folder, b"", 100 * 2**20 // 31, 2**28)
+    return beside_signals(folder, [], 2**28, empty=100 * 2**20 // 31)
 
 
 def tiny_chunks(folder: Path) -> Path:
     """Chunks of a megabyte of zeros."""
-    return beside_signals(folder, bytes(2**20), 4000, 2**20)
+    return beside_signals(folder, [bytes(2**20)] * 4000, 2**20)
 
 
-def beside_signals(folder: Path, payload: bytes, count: int, chunk_size: int) -> Path:
-    """Return a file of equal messages on one topic beside the signals, without an index."""
+def beside_signals(folder: Path, payloads: list[bytes], chunk_size: int, empty: int = 0) -> Path:
+    """Return a file of messages on one topic beside the signals, without an index."""
     names = ("/other", "/rig/motor_position", "/rig/motor_torque")
     messages = [(name, k * MS, SIGNAL) for k in range(1, 9) for name in names]
     return mcap_bag(
         folder,
-        [*messages, *[("/other", 0, payload)] * count],
+        [*messages, *(("/other", 0, payload) for payload in payloads)],
         ("sensor_msgs/msg/JointState", "ros2msg", ""),
+        empty,
         chunk_size=chunk_size,
         index_types=IndexType.NONE,
         enable_crcs=False,
