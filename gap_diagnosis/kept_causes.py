@@ -49,14 +49,32 @@ def kept(
         weakest = min(tested if blurred else failed, key=lambda t: t.gain.mean)
         before = [fit for fit in steps if weakest.effect not in fit.effects]
         last = weakest.without
-        steps = before if last.effects == before[-1].effects else [*before, last]
         same = last.effects == before[-1].effects
+        if not same:
+            last = _begun_anew(fitter, last, before[-1])
+        steps = before if same else [*before, last]
         if same and fitter.gains(last, before[-1]).sum() > 0.0:
             steps[-1] = last
         tested = []
     if tested and any(len(fit.effects) != count for count, fit in enumerate(steps)):
         steps = [steps[0], *_one_by_one(fitter, steps[-1], tested)]
     return replace(found, steps=steps), tested
+
+
+def _begun_anew(fitter: CellFitter, fit: CellFit, before: CellFit) -> CellFit:
+    """Return a fit that has lost a cause, or the same causes begun from an earlier step, if better.
+
+    A cause that stood for another one leaves the fit where that other one did little.
+    """
+    added = [effect for effect in fit.effects if effect not in before.effects]
+    if len(added) != 1:
+        return fit
+    proposals = fitter.screening(before, added[0]).proposals()
+    anew = fitter.add(before, added[0], proposals) if proposals else None
+    if anew is None:
+        return fit
+    anew = anew if anew.solution.converged else fitter.further(anew)
+    return anew if fitter.misfit(anew) < fitter.misfit(fit) else fit
 
 
 def _one_by_one(fitter: CellFitter, fit: CellFit, tested: Sequence[Tested]) -> list[CellFit]:

@@ -124,19 +124,19 @@ def investigate_records(
         fitter = CellFitter(Evidence(records, nominal, slow), model.plant, tolerance)
         timing = Timing(fitter, fitter.refit(), (QUASI_STATIC,))
     until = begun + _SEARCH_SHARE * budget_s
-    if not _follows(timing.fitter, timing.refit, _HOPELESS):
+    if _misses(timing.fitter, timing.refit) > _HOPELESS:
         names = []
-    found = Stepwise(timing.fitter, names, progress, until).run(timing.refit)
+    found = _searched(timing, names, progress, until)
     if timing.held is not None and timing.better_held(found.best):
         timing = timing.held
         progress("search with a torque that is held")
-        found = Stepwise(timing.fitter, names, progress, until).run(timing.refit)
+        found = _searched(timing, names, progress, until)
     fitter, evidence, heard = timing.fitter, timing.fitter.evidence, [*timing.notes]
     progress("scatter from run to run")
     bags, scatter, said = _run_scatter(fitter, found.best)
     heard += said
     found, tested = kept(fitter, found, scatter, progress)
-    if (tested or not names) and not _follows(fitter, found.best):
+    if (tested or not names) and _misses(fitter, found.best) >= 1.0:
         found, tested = replace(found, steps=found.steps[:1]), []
         heard.append(LOST)
     progress("what may stand in for a cause")
@@ -147,9 +147,14 @@ def investigate_records(
     return RecordInvestigation(fitter, model, found, tuple(tested), diagnosis)
 
 
-def _follows(fitter: CellFitter, fit: CellFit, times: float = 1.0) -> bool:
-    """Tell whether a fit misses less than some times the motion on the parts that report."""
-    return float(np.mean(Ledger(fitter.evidence).squares(fit.model))) < times**2
+def _searched(timing: Timing, names: Sequence[str], progress: Progress, until: float) -> Found:
+    misses = partial(_misses, timing.fitter)
+    return Stepwise(timing.fitter, names, progress, until, misses).run(timing.refit)
+
+
+def _misses(fitter: CellFitter, fit: CellFit) -> float:
+    """Return which share of the motion a fit misses on the parts that report, rms."""
+    return float(np.sqrt(np.mean(Ledger(fitter.evidence).squares(fit.model))))
 
 
 def _run_scatter(

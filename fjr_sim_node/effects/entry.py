@@ -84,6 +84,7 @@ class Effect:
             empty if nothing is that near.
         same_as: what it equals exactly, in words; empty if nothing.
         ripple: whether it is periodic in the motor angle, so that `cycles_per_turn` is searched.
+        of_load: whether it goes with the torque in the gear.
         scales: whether it scales the parameters of the bare plant, wholly or about one angle.
         contains: effects that it holds as limit cases, which explain what they can with less.
         from_part: where its fit begins if one of what it holds was fitted: its parameters by full
@@ -112,6 +113,7 @@ class Effect:
     looks_like: str = ""
     same_as: str = ""
     ripple: bool = False
+    of_load: bool = False
     scales: bool = False
     contains: tuple[str, ...] = ()
     from_part: FromPart | None = None
@@ -132,6 +134,14 @@ class Effect:
         """Full names of sizes and limits: the parameters that switch the effect off."""
         pairs = zip(self.names, self.parameters, strict=True)
         return tuple(name for name, p in pairs if p.role in ("size", "limit"))
+
+    @property
+    def depends_on_others(self) -> bool:
+        """Whether what it changes depends much on the causes beside it: on what is left, or loads.
+
+        Period and phase of a ripple are those of the error that is left.
+        """
+        return self.ripple or self.of_load
 
     @property
     def on_rigid_axis(self) -> bool:

@@ -164,14 +164,16 @@ FRICTION: tuple[Effect, ...] = (
     ),
     Effect(
         "load_friction",
-        "Motor Coulomb friction grows with the transmitted torque.",
+        "Motor Coulomb friction grows with the torque in the gear.",
         "transmission",
         "plant.torques:motor_level",
         "resonance lower at all amplitudes",
         "Hamon, Gautier, Garrec 2010, IROS, load-dependent gear friction",
-        (size("coefficient", "", "Friction per transmitted torque", 0.0, 0.95, fit=(0.0, 0.5)),),
+        (size("coefficient", "", "Friction per torque in the gear", 0.0, 0.95, fit=(0.0, 0.9)),),
         ({"coefficient": (0.01, 0.05)},),
         looks_like="loss that grows with the load",
+        of_load=True,
+        axis="both",
     ),
     Effect(
         "directional_loss",
@@ -181,10 +183,10 @@ FRICTION: tuple[Effect, ...] = (
         "as load friction, other where the load drives the motor",
         "Wang, Kim 2015, IFToMM; gear efficiency forward and backward",
         (
-            size("forward", "", "Friction per transmitted torque while the motor drives", 0.0,
-                 0.95, fit=(0.0, 0.5)),
-            size("backward", "", "Friction per transmitted torque while the load drives", 0.0,
-                 0.95, fit=(0.0, 0.5)),
+            size("forward", "", "Friction per torque in the gear while the motor drives", 0.0,
+                 0.95, fit=(0.0, 0.9)),
+            size("backward", "", "Friction per torque in the gear while the load drives", 0.0,
+                 0.95, fit=(0.0, 0.9)),
         ),
         (
             {"forward": (0.01, 0.05), "backward": (0.0,)},
@@ -192,6 +194,8 @@ FRICTION: tuple[Effect, ...] = (
         ),
         looks_like="loss that grows with the load",
         same_as="load_friction with all parameters behind the gear scaled, while the motor slides",
+        of_load=True,
+        axis="both",
     ),
     Effect(
         "position_friction",

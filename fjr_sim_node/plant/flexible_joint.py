@@ -159,9 +159,9 @@ def _advance(s, torque, w, duration, p, e):
             speed = deflection_speed(s[1], s[2], s[3], e)
             region = spring_region(deflection(s[0], s[2], e), speed, e)
             m = (link, motor, flex_direction(s, torque, m, w, p, e), region)
-        w = facing(s, m, w, p, e)
+        w = facing(s, torque, m, w, p, e)
         s, m, w = advance_smoothly(s, torque, m, w, h, p, e)
-        w = remembered(s, m, w, p, e)
+        w = remembered(s, torque, m, w, p, e)
     return s, w
 
 

@@ -22,6 +22,7 @@ from .places import FS, FSM, JM, LINK_BRISTLES, MOTOR_BRISTLES, J, is_rigid
 from .presliding import bristle_damping, bristle_torque
 from .spring import build_up, deflection, transmitted_torque
 from .torques import (
+    gear_load,
     link_drive,
     link_level,
     link_viscous,
@@ -65,11 +66,21 @@ def motor_built_up(s, level, m, w, p):
 
 
 @inlined
-def motor_friction(s, te, m, w, p, e):
+def load_of(s, te, torque, direction, p, e):
+    """Return the `gear_load` (N m) under a torque that the drive is asked for (N m)."""
+    if e is None:
+        return te
+    if e[fx.ACTUATOR_LAG_TIME_CONSTANT_S] != 0.0:
+        torque = s[6]
+    return gear_load(s[2], s[3], te, torque, s[7], direction, p, e)
+
+
+@inlined
+def motor_friction(s, te, torque, m, w, p, e):
     """Return Coulomb friction of the motor (N m), with the damping of its bristles."""
     if e is None or e[fx.FRICTION_ON] == 0.0:
         return p[FSM] * m[1]
-    level = motor_level(abs(s[3]), m[1], s[2], te, p, e)
+    level = motor_level(abs(s[3]), m[1], s[2], load_of(s, te, torque, m[1], p, e), p, e)
     if p[MOTOR_BRISTLES] == 0.0:
         return level * m[1]
     built = motor_built_up(s, level, m, w, p)
@@ -104,7 +115,7 @@ def derivative(s, torque, m, w, p, e):
         friction = link_viscous(s[1], p, e) + link_friction(s, m, w, p, e)
         aq = (link_torque(s, te, p, e) - friction) / p[J]
     if m[1] != 0.0:
-        friction = motor_viscous(s[3], p, e) + motor_friction(s, te, m, w, p, e)
+        friction = motor_viscous(s[3], p, e) + motor_friction(s, te, torque, m, w, p, e)
         ath = (motor_torque(s, te, torque, p, e) - friction) / p[JM]
     if e is None:
         return s[1], aq, s[3], ath, 0.0, 0.0, 0.0, 0.0

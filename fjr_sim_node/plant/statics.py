@@ -18,15 +18,19 @@ from .torques import (
     motor_drive,
     motor_level,
     motor_viscous,
+    outside,
     torque_ripple,
 )
 
 
 @inlined
 def _transmitted(th, v, direction, p, e):
-    """Return the torque by which the transmission turns the motor (N m); zero of one body."""
+    """Return the torque by which the transmission turns the motor (N m).
+
+    Of one body, what its gear carries, which turns it already.
+    """
     if is_rigid(p):
-        return 0.0
+        return 0.0 if e is None else outside(th, th, e)
     friction = link_level(abs(v), p, e) * direction + link_viscous(v, p, e)
     return link_drive(th, v, 0.0, th, v, th, p, e) - friction
 
@@ -47,7 +51,7 @@ def torque_along(angle, speed, direction, p, e, torque):
         th, v, way = angle[k], speed[k], direction[k]
         te = _transmitted(th, v, way, p, e)
         needed = motor_level(abs(v), way, th, te, p, e) * way + motor_viscous(v, p, e)
-        needed -= motor_drive(th, v, te, 0.0, th, p, e)
+        needed -= motor_drive(th, v, 0.0 if is_rigid(p) else te, 0.0, th, p, e)
         if e is not None and e[fx.DRIVE_ON] != 0.0:
             needed /= 1.0 + torque_ripple(th, e)
         torque[k] = needed

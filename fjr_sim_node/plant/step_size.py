@@ -10,7 +10,7 @@ import math
 from fjr_kit.compiled import inlined, jit
 
 from .. import effects as fx
-from .motion import link_torque, motor_torque
+from .motion import link_torque, load_of, motor_torque
 from .places import FS, FV, FVM, JM, K0, K1, LINK_BRISTLES, MOTOR_BRISTLES, J, is_rigid
 from .spring import deflection, deflection_speed, transmitted_torque
 from .torques import (
@@ -131,7 +131,9 @@ def slackened(s, torque, w, duration, p, e):
         drive = abs(link_torque(s, te, p, e)) + level + abs(link_viscous(s[1], p, e))
         link *= _still_bent(w[0], level, s[1], drive / p[J], duration)
     if motor != 0.0:
-        level = motor_level(abs(s[3]), 1.0 if s[3] > 0.0 else -1.0, s[2], te, p, e)
+        direction = 1.0 if s[3] > 0.0 else -1.0
+        load = load_of(s, te, torque, direction, p, e)
+        level = motor_level(abs(s[3]), direction, s[2], load, p, e)
         drive = abs(motor_torque(s, te, torque, p, e)) + level + abs(motor_viscous(s[3], p, e))
         motor *= _still_bent(w[1], level, s[3], drive / p[JM], duration)
     return p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], link, motor

@@ -15,6 +15,7 @@ from .motion import (
     flex_state,
     link_friction,
     link_torque,
+    load_of,
     motor_built_up,
     motor_friction,
     motor_torque,
@@ -77,11 +78,11 @@ def motor_direction(s, torque, m, w, p, e):
     te = transmitted(s, m, w, p, e)
     drive = motor_torque(s, te, torque, p, e)
     if e is not None and p[MOTOR_BRISTLES] != 0.0:
-        return _creep_direction(drive - motor_friction(s, te, m, w, p, e), m[1])
+        return _creep_direction(drive - motor_friction(s, te, torque, m, w, p, e), m[1])
     if not motor_has_coulomb(p, e):
         return 1.0
     direction = 1.0 if drive > 0.0 else -1.0
-    level = motor_level(0.0, direction, s[2], te, p, e)
+    level = motor_level(0.0, direction, s[2], load_of(s, te, torque, direction, p, e), p, e)
     return direction if abs(drive) > level else 0.0
 
 
@@ -126,7 +127,8 @@ def _motor_margin(s, torque, m, w, p, e):
     te = transmitted(s, m, w, p, e)
     drive = motor_torque(s, te, torque, p, e)
     direction = 1.0 if drive > 0.0 else -1.0
-    return motor_level(0.0, direction, s[2], te, p, e) - abs(drive)
+    level = motor_level(0.0, direction, s[2], load_of(s, te, torque, direction, p, e), p, e)
+    return level - abs(drive)
 
 
 @inlined
@@ -211,7 +213,7 @@ def _stopped(s, link, motor):
 
 
 @inlined
-def remembered(s, m, w, p, e):
+def remembered(s, torque, m, w, p, e):
     """Return w with what has built up until now, counted from here on; `facing` completes it."""
     if e is None or (e[fx.FRICTION_ON] == 0.0 and e[fx.TRANSMISSION_ON] == 0.0):
         return w
@@ -219,14 +221,15 @@ def remembered(s, m, w, p, e):
     if p[LINK_BRISTLES] != 0.0:
         link = link_friction(s, m, w, p, e)
     if p[MOTOR_BRISTLES] != 0.0:
-        level = motor_level(abs(s[3]), m[1], s[2], transmitted(s, m, w, p, e), p, e)
+        load = load_of(s, transmitted(s, m, w, p, e), torque, m[1], p, e)
+        level = motor_level(abs(s[3]), m[1], s[2], load, p, e)
         motor = motor_built_up(s, level, m, w, p)
     built_up = link, motor, flex_state(s, m, w, e)
     return (*built_up, s[0], s[2], deflection(s[0], s[2], e), w[6], w[7])
 
 
 @inlined
-def facing(s, m, w, p, e):
+def facing(s, torque, m, w, p, e):
     """Return w with the levels of presliding friction in the directions that now begin."""
     if e is None or e[fx.FRICTION_ON] == 0.0:
         return w
@@ -234,7 +237,8 @@ def facing(s, m, w, p, e):
     if p[LINK_BRISTLES] != 0.0:
         link = link_level(abs(s[1]), p, e)
     if p[MOTOR_BRISTLES] != 0.0:
-        motor = motor_level(abs(s[3]), m[1], s[2], transmitted(s, m, w, p, e), p, e)
+        load = load_of(s, transmitted(s, m, w, p, e), torque, m[1], p, e)
+        motor = motor_level(abs(s[3]), m[1], s[2], load, p, e)
     return w[0], w[1], w[2], w[3], w[4], w[5], link, motor
 
 
@@ -266,7 +270,7 @@ def advance_smoothly(s, torque, m, w, h, p, e):
             return s1, m, w
         s = runge_kutta(s, torque, m, w, time, p, e)
         h -= time
-        w = remembered(s, m, w, p, e)
+        w = remembered(s, torque, m, w, p, e)
         link, motor, flex, region = m
         if first == 0:
             if link == 0.0:
@@ -285,7 +289,7 @@ def advance_smoothly(s, torque, m, w, h, p, e):
         elif e is not None:
             region = next_region(deflection(s[0], s[2], e), region, e)
         m = (link, motor, flex, region)
-        w = facing(s, m, w, p, e)
+        w = facing(s, torque, m, w, p, e)
     # Only a torque that grazes the Coulomb level comes here: stop a side that would reverse.
     s = runge_kutta(s, torque, m, w, h, p, e)
     link_reversed = _margin(0, s, torque, m, w, p, e) < 0.0

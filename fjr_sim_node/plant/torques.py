@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from fjr_kit.compiled import inlined
+from fjr_kit.compiled import inlined, jit
 
 from .. import effects as fx
 from .places import FS, FSM, FV, FVM, is_rigid
@@ -28,8 +28,11 @@ def link_level(speed, p, e):
 
 
 @inlined
-def motor_level(speed, direction, th, te, p, e):
-    """Return the Coulomb level of the motor (N m) in a slip direction; never below zero."""
+def motor_level(speed, direction, th, load, p, e):
+    """Return the Coulomb level of the motor (N m) in a slip direction; never below zero.
+
+    It may grow with the load of the gear (N m), see `gear_load`.
+    """
     if e is None or e[fx.FRICTION_ON] == 0.0:
         return p[FSM]
     level = p[FSM]
@@ -46,11 +49,11 @@ def motor_level(speed, direction, th, te, p, e):
     if e[fx.LUGRE_FRICTION_STRIBECK_NM] != 0.0:
         ratio = speed / e[fx.LUGRE_FRICTION_VELOCITY_RAD_S]
         level += e[fx.LUGRE_FRICTION_STRIBECK_NM] * math.exp(-ratio * ratio)
-    level += e[fx.LOAD_FRICTION_COEFFICIENT] * abs(te)
-    if te * direction < 0.0:
-        level += e[fx.DIRECTIONAL_LOSS_FORWARD] * abs(te)
+    level += e[fx.LOAD_FRICTION_COEFFICIENT] * abs(load)
+    if load * direction < 0.0:
+        level += e[fx.DIRECTIONAL_LOSS_FORWARD] * abs(load)
     else:
-        level += e[fx.DIRECTIONAL_LOSS_BACKWARD] * abs(te)
+        level += e[fx.DIRECTIONAL_LOSS_BACKWARD] * abs(load)
     return max(level, 0.0)
 
 
@@ -92,17 +95,24 @@ def cable_pull(angle, slack, e):
 
 
 @inlined
+def outside(angle, slack, e):
+    """Return the torque (N m) of gravity, a spring and a cable on the body that they act on."""
+    torque = 0.0
+    if e[fx.GRAVITY_TORQUE_NM] != 0.0:
+        torque -= e[fx.GRAVITY_TORQUE_NM] * math.sin(angle + e[fx.GRAVITY_ANGLE_RAD])
+    if e[fx.EXTERNAL_SPRING_STIFFNESS_NM_RAD] != 0.0:
+        torque -= e[fx.EXTERNAL_SPRING_STIFFNESS_NM_RAD] * (angle - e[fx.EXTERNAL_SPRING_REST_RAD])
+    if e[fx.CABLE_STIFFNESS_NM_RAD] != 0.0:
+        torque += cable_pull(angle, slack, e)
+    return torque
+
+
+@inlined
 def link_drive(q, vq, te, q3, v3, slack, p, e):
     """Return the torque that drives the link against its friction (N m)."""
     if e is None or e[fx.TRANSMISSION_ON] == 0.0:
         return -te
-    drive = -te
-    if e[fx.GRAVITY_TORQUE_NM] != 0.0:
-        drive -= e[fx.GRAVITY_TORQUE_NM] * math.sin(q + e[fx.GRAVITY_ANGLE_RAD])
-    if e[fx.EXTERNAL_SPRING_STIFFNESS_NM_RAD] != 0.0:
-        drive -= e[fx.EXTERNAL_SPRING_STIFFNESS_NM_RAD] * (q - e[fx.EXTERNAL_SPRING_REST_RAD])
-    if e[fx.CABLE_STIFFNESS_NM_RAD] != 0.0:
-        drive += cable_pull(q, slack, e)
+    drive = outside(q, slack, e) - te
     if e[fx.EXTRA_MODE_INERTIA_KG_M2] != 0.0:
         rate = 2.0 * math.pi * e[fx.EXTRA_MODE_FREQUENCY_HZ]
         damping = 2.0 * e[fx.EXTRA_MODE_DAMPING_RATIO] * rate
@@ -160,12 +170,8 @@ def motor_drive(th, vth, te, torque, slack, p, e):
     if e[fx.TRANSMISSION_ON] == 0.0:
         return drive + te
     drive += te * lever(th, e)
-    if e[fx.GRAVITY_TORQUE_NM] != 0.0 and is_rigid(p):
-        drive -= e[fx.GRAVITY_TORQUE_NM] * math.sin(th + e[fx.GRAVITY_ANGLE_RAD])
-    if e[fx.EXTERNAL_SPRING_STIFFNESS_NM_RAD] != 0.0 and is_rigid(p):
-        drive -= e[fx.EXTERNAL_SPRING_STIFFNESS_NM_RAD] * (th - e[fx.EXTERNAL_SPRING_REST_RAD])
-    if e[fx.CABLE_STIFFNESS_NM_RAD] != 0.0 and is_rigid(p):
-        drive += cable_pull(th, slack, e)
+    if is_rigid(p):
+        drive += outside(th, slack, e)
     return drive
 
 
@@ -185,3 +191,30 @@ def motor_viscous(v, p, e):
     return p[FVM] * v + (
         e[fx.QUADRATIC_FRICTION_MOTOR_NM_S2_RAD2] * v + e[fx.ASYMMETRIC_FRICTION_VISCOUS_NM_S_RAD]
     ) * abs(v)
+
+
+@jit
+def gear_load(th, vth, te, torque, slack, direction, p, e):
+    """Return the torque (N m) of the gear on the motor, with which the losses in it grow.
+
+    A rigid axis has rotor and load on the two sides of its gear, so that what the gear carries lies
+    between what the motor has left beside its friction and what the load needs at rest. Half way is
+    taken, as if the inertias of both were equal; at slow motion both are the same.
+    """
+    if e is None or not is_rigid(p):
+        return te
+    if load_coefficient(e) == 0.0:
+        return 0.0
+    friction = motor_viscous(vth, p, e) + direction * motor_level(
+        abs(vth), direction, th, 0.0, p, e
+    )
+    carried = 0.5 * (torque - friction)
+    if e[fx.TRANSMISSION_ON] != 0.0:
+        carried -= 0.5 * outside(th, slack, e)
+    forward = carried * direction > 0.0
+    lost = e[fx.LOAD_FRICTION_COEFFICIENT]
+    if forward:
+        lost += e[fx.DIRECTIONAL_LOSS_FORWARD]
+        return -carried / (1.0 + 0.5 * lost)
+    lost += e[fx.DIRECTIONAL_LOSS_BACKWARD]
+    return -carried / (1.0 - 0.5 * lost)

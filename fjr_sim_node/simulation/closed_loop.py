@@ -24,6 +24,8 @@ from fjr_kit.errors import InputError
 
 from . import rig
 
+_NOTHING = np.empty(0)
+
 
 @dataclass(frozen=True)
 class State:
@@ -91,7 +93,7 @@ def _run(reference, noise, sample_period, p, e, c, x, state, position, torque, l
 
 @jit
 def _run_law(
-    reference, command, added, noise, sample_period, substeps, p, e, x, law, state,
+    reference, beside, observes, noise, sample_period, substeps, p, e, x, law, state,
     position, torque, link, motor,
 ):  # fmt: skip
     b, forward, a, limit = law
@@ -99,10 +101,10 @@ def _run_law(
         y = rig.measure(state, noise[k], e)
         own = transfer_function.step(x, reference[k], y, b, forward, a, limit)
         u, prompt = own, 0.0
-        if command is not None:
-            u, prompt = command[k], own
-        elif added is not None:
-            u = own + added[k]
+        if observes:
+            u, prompt = beside[k], own
+        elif beside.size > 0:
+            u = own + beside[k]
         position[k], torque[k] = y, u + prompt
         link[k], motor[k] = state[rig.LINK], state[rig.MOTOR]
         for _ in range(substeps):
@@ -203,14 +205,15 @@ def simulate_law(
                 controller_state, controller.states, "controller_state", "states"
             )
     reference, noise, out = _prepared(reference, noise, begin)
+    beside = _NOTHING
     if command is not None:
-        command = _of_length(command, reference.size, "command", "samples")
-    if added is not None:
-        added = _of_length(added, reference.size, "added", "samples")
+        beside = _of_length(command, reference.size, "command", "samples")
+    elif added is not None:
+        beside = _of_length(added, reference.size, "added", "samples")
     _run_law(
         reference,
-        command,
-        added,
+        beside,
+        command is not None,
         noise,
         1.0 / sample_rate_hz,
         substeps,

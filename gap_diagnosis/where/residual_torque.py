@@ -25,7 +25,7 @@ from fjr_sim_node.plant import advance, advance_with_effects
 from fjr_sim_node.plant.places import FS, FSM, FV, K0, K1, J
 from fjr_sim_node.plant.presliding import bristle_damping, has_motor_bristles
 from fjr_sim_node.plant.spring import transmitted_torque
-from fjr_sim_node.plant.torques import motor_drive, motor_level, motor_viscous
+from fjr_sim_node.plant.torques import gear_load, motor_drive, motor_level, motor_viscous
 from fjr_sim_node.simulation.rig import at_rest, driven
 
 from ..model.simulated_rig import Model
@@ -272,10 +272,13 @@ def _missing_torque(states, rest, p, e, missing, friction):
         balance = p[0] * ath + motor_viscous(vth, p, e) - motor_drive(th, vth, te, u, slack, p, e)
         if abs(vth) > rest:
             direction = 1.0 if vth > 0.0 else -1.0
-            torque = direction * motor_level(abs(vth), direction, th, te, p, e)
+            load = gear_load(th, vth, te, u, slack, direction, p, e)
+            torque = direction * motor_level(abs(vth), direction, th, load, p, e)
             if e is not None and has_motor_bristles(e):
                 torque = built + bristle_damping(built, abs(torque), direction, vth, e)
         else:
-            level = motor_level(0.0, 1.0 if balance < 0.0 else -1.0, th, te, p, e)
+            direction = 1.0 if balance < 0.0 else -1.0
+            load = gear_load(th, 0.0, te, u, slack, direction, p, e)
+            level = motor_level(0.0, direction, th, load, p, e)
             torque = min(max(-balance, -level), level)
         missing[k], friction[k] = balance + torque, torque

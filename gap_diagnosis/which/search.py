@@ -155,8 +155,8 @@ class Search:
         """Return the hopeful ones of some effects, best first, and screenings beside a fit.
 
         What a seed changes hardly depends on the effects beside it: so the first screenings say
-        which may gain as a second effect, and only those are screened anew, and ripples, whose
-        period depends on what is left.
+        which may gain as a second effect, and only those are screened anew, and effects that
+        depend on others.
         """
         if most is None or not self._first:
             screened = {effect: self._fitter.screening(parent, effect) for effect in effects}
@@ -165,7 +165,7 @@ class Search:
             promise = {
                 e: self._fitter.promise(self._first[e], parent)
                 for e in effects
-                if e in self._first and not fx.EFFECTS[e].ripple
+                if e in self._first and not fx.EFFECTS[e].depends_on_others
             }
             best = sorted(promise, key=lambda e: -promise[e])[: _SCREENED * most]
             again = [e for e in effects if e in best or e not in promise]

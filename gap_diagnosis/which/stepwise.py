@@ -26,7 +26,7 @@ beside no cause yet, beside others."""
 _PARENTS = 3  # leading fits beside which a second cause of slow motion is looked for
 _POLISHED = 2  # leading fits of a step that are taken further
 _WORTH_A_HARMONIC = 1.3  # a misfit: what noise leaves is no second harmonic
-_AGAIN = 8  # effects without ripple that are screened beside a cause
+_AGAIN = 8  # effects that are screened beside a cause, and those that depend on others
 _OUTDATED = 0.1  # of the squared error that is left: then what was screened before is too far
 NOTHING_LEFT = 2.0
 """Mean squared error over noise below which noise explains what is left."""
@@ -36,6 +36,9 @@ that closes less would not be named, for it may be a part of what no effect expl
 LEAST_CLOSED_LATER = 0.5
 """The same for a third cause and any later one, of which one must be sure."""
 _CERTAIN_CAUSES = 2
+_MUCH = 0.1
+"""Share of the motion that an explanation misses, rms, above which something great is not found
+yet: where what promises most does not pass, what promises less is fitted, too."""
 _MUCH_LESS = 0.3  # of the greatest gain: a cause that gains less waits for the next step
 _START_LESS = 0.2  # of the greatest gain of a start: an effect whose best one gains less waits
 
@@ -73,6 +76,7 @@ class Stepwise:
         effects: Sequence[str],
         progress: Progress = lambda _: None,
         until: float = float("inf"),
+        misses: Callable[[CellFit], float] = lambda _: 0.0,
     ) -> None:
         """Take what to search.
 
@@ -81,8 +85,10 @@ class Stepwise:
             effects: identifiers to try.
             progress: told what is tried.
             until: instant of `time.monotonic` after which nothing new is begun.
+            misses: how much of the motion an explanation misses, as a share.
         """
         self._fitter, self._effects, self._progress, self._until = fitter, effects, progress, until
+        self._misses = misses
         self._first: tuple[CellFit, dict[str, Screening]] | None = None
 
     def run(self, refit: CellFit) -> Found:
@@ -98,6 +104,10 @@ class Stepwise:
             chosen = self._repeating(fits, found)
             if chosen is None and self._fitter.evidence.slow:
                 fits = self._pairs(fits, found.steps[0])
+                chosen = self._repeating(fits, found)
+            if chosen is None and not self._over and self._misses(found.best) > _MUCH:
+                passed = [fit.effects[-1] for fit in fits]
+                fits = self._extended(found.best, found.steps[0], passed)
                 chosen = self._repeating(fits, found)
             if chosen is None:
                 break
@@ -162,10 +172,18 @@ class Stepwise:
         """Return how much of its best band a further cause must close to be named in the end."""
         return LEAST_CLOSED if len(found.best.effects) < _CERTAIN_CAUSES else LEAST_CLOSED_LATER
 
-    def _extended(self, parent: CellFit, refit: CellFit) -> list[CellFit]:
-        """Return the parent with each promising effect more, best on unseen parts first."""
+    def _extended(
+        self, parent: CellFit, refit: CellFit, tried: Sequence[str] = ()
+    ) -> list[CellFit]:
+        """Return the parent with each promising effect more, best on unseen parts first.
+
+        Args:
+            parent: the explanation to extend.
+            refit: the fit of the base parameters alone.
+            tried: effects that are left out, since they were tried.
+        """
         names, nominal = self._effects, self._fitter.nominal
-        there = {*parent.effects, *self._one_cause(parent, refit)}
+        there = {*parent.effects, *tried, *self._one_cause(parent, refit)}
         effects = [e for e in names if e not in there]
         effects = founded(effects, parent.effects, nominal, names)
         screened = self._screened(parent, effects)
@@ -254,8 +272,7 @@ class Stepwise:
 
         What a seed changes hardly depends on causes beside it, so the first changes say which
         effects may gain beside others; where a cause has closed most of the error, that is not so
-        near any more, and all are screened anew. So are ripples, whose period depends on what is
-        left.
+        near any more, and all are screened anew. So are effects that depend on others.
         """
         anew = self._first is None or left_of(self._fitter, parent, self._first[0]) < _OUTDATED
         if self._first is not None and not anew:
@@ -263,7 +280,7 @@ class Stepwise:
             promise = {
                 e: self._fitter.promise(screened[e], before, parent)
                 for e in effects
-                if e in screened and not fx.EFFECTS[e].ripple
+                if e in screened and not fx.EFFECTS[e].depends_on_others
             }
             best = sorted(promise, key=lambda e: -promise[e])[:_AGAIN]
             effects = [e for e in effects if e in best or e not in promise]

@@ -99,6 +99,54 @@ def test_a_gear_that_loses_much_backward_cannot_be_driven_by_its_load():
         assert (body.hold(0.0, 0.01)[2] != 0.02) == moves
 
 
+RIGID = {"k0": math.inf, "fs": 0.0, "fv": 0.0, "fvm": 0.0}
+
+
+@pytest.mark.parametrize("name", ["load_friction", "directional_loss"])
+def test_a_gear_of_a_rigid_axis_carries_half_of_what_the_motor_has_beside_friction(name):
+    """Rotor and load have half of the inertia each, so half of the torque goes through the gear."""
+    on = {"load_friction": {"coefficient": 0.2}, "directional_loss": {"forward": 0.2}}[name]
+    inertia = JM + J
+    carried = 0.5 * (40.0 - FSM) / 1.1  # T = (u - FSM - 0.2 T) / 2
+    speed = Rig(RIGID, named(name, **on)).hold(40.0, 0.1)[3]
+    assert speed == pytest.approx(0.1 * (40.0 - FSM - 0.2 * carried) / inertia, rel=1e-9)
+    braking = Rig(RIGID, named(name, **on)).start(vth=2.0).hold(-20.0, 0.01)[3]
+    lost = 0.2 * 0.5 * (20.0 + FSM) / 0.9 if name == "load_friction" else 0.0
+    assert braking == pytest.approx(2.0 - 0.01 * (20.0 + FSM + lost) / inertia, rel=1e-9)
+
+
+@pytest.mark.parametrize(("torque", "weight", "sticks"), [
+    (0.0, 7.4, True), (0.0, 7.6, False),  # the weight drives: 7.5 N m less a fifth of it are 6
+    (17.9, 10.0, True), (18.1, 10.0, False),  # the motor lifts: 10 N m, 2 lost, 6 of Coulomb
+])  # fmt: skip
+def test_a_gear_of_a_rigid_axis_loses_a_share_of_the_weight(torque, weight, sticks):
+    on = named("gravity", torque_nm=weight, angle_rad=0.5 * math.pi)
+    on |= named("load_friction", coefficient=0.2)
+    assert (Rig(RIGID, on).hold(torque, 0.1)[2] == 0.0) == sticks
+
+
+@pytest.mark.parametrize("torque", [0.0, 3.0, -3.0])
+@pytest.mark.parametrize("first", [
+    named("load_friction", coefficient=0.3), named("directional_loss", forward=0.4, backward=0.1),
+], ids=["load friction", "directional loss"])  # fmt: skip
+@pytest.mark.parametrize("second", [
+    {}, named("gravity", torque_nm=6.0, angle_rad=0.4),
+    named("presliding_friction", motor_rad=1e-3),
+    named("external_spring", stiffness_nm_rad=50.0), named("actuator_lag", time_constant_s=2e-3),
+    named("lugre_friction", stribeck_nm=3.0, velocity_rad_s=0.05, bristle_nm_rad=6e3),
+], ids=["alone", "gravity", "presliding", "spring", "lag", "lugre"])  # fmt: skip
+def test_a_gear_of_a_rigid_axis_makes_no_energy(first, second, torque):
+    body = Rig(RIGID, first | second).start(th=-0.01, vth=0.3)
+    at_play = 0.1 + abs(body.energy())
+    for _ in range(20):  # a lag settles
+        body.hold(torque)
+    stored = []
+    for _ in range(400):
+        body.hold(torque)
+        stored.append(body.energy() - body.work(torque))
+    assert np.diff(stored).max() < 1e-5 * at_play
+
+
 def test_a_motor_at_limited_voltage_runs_up_to_its_no_load_speed():
     on = named("torque_speed_limit", stall_nm=10.0, no_load_rad_s=4.0)
     states = Rig(FREE_MOTOR, on).play(np.full(400, 50.0))

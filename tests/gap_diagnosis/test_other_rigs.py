@@ -194,10 +194,9 @@ def test_effects_of_transmission_and_link_are_not_looked_for_on_a_rigid_axis():
     fitter = Fitter(case.recorded, simulator, std, model.plant, (0, 2), (1, 3))
     fitted = {e.identifier for e in effects.CATALOGUE if e.starts and not e.on_request}
     assert fitted - set(fitter.catalogue) == {
-        "stribeck_friction_link", "load_friction", "backlash", "piecewise_stiffness", "hysteresis",
+        "stribeck_friction_link", "backlash", "piecewise_stiffness", "hysteresis",
         "transmission_damping", "kinematic_error", "extra_mode",
-        "coulomb_friction", "viscous_friction", "directional_loss", "asymmetric_stiffness",
-        "cubic_stiffness",
+        "coulomb_friction", "viscous_friction", "asymmetric_stiffness", "cubic_stiffness",
     }  # fmt: skip
     refit = fitter.refit()
     assert set(refit.model.plant) == {"jm", "fsm", "fvm"}

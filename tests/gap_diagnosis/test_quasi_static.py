@@ -81,6 +81,21 @@ def test_the_torque_along_a_slow_motion_is_that_of_the_simulated_rig(name):
         assert np.quantile(np.abs(bare), 0.97) > 0.08 * torque
 
 
+@pytest.mark.parametrize("loss", [
+    {"load_friction.coefficient": 0.3},
+    {"directional_loss.forward": 0.4, "directional_loss.backward": 0.1},
+], ids=["load friction", "directional loss"])  # fmt: skip
+def test_the_torque_along_a_slow_motion_holds_what_the_gear_of_a_rigid_axis_loses(loss):
+    rigid, law = NOMINAL | {"k0": np.inf}, LAWS["gravity"] | loss
+    found = stations(slow_record(law, plant=rigid), rigid)
+    simulator = Evidence(found.records, rigid, found).simulator
+    (missing,) = simulator.missing_torque(Model(Model.nominal(rigid).plant, law), [0])
+    torque = np.std(found.records.records[0].torque)
+    assert np.quantile(np.abs(missing), 0.97) < 0.04 * torque
+    (without,) = simulator.missing_torque(Model(Model.nominal(rigid).plant, LAWS["gravity"]), [0])
+    assert np.quantile(np.abs(without), 0.97) > 0.08 * torque
+
+
 @pytest.fixture(scope="module")
 def found() -> RecordInvestigation:
     return investigate_any(slow_record(RIPPLE), SMOOTH)
