@@ -39,7 +39,7 @@ def test_pause_step_speed_reset_stop_and_play_by_the_command(start, rig):
     def ask(service: str) -> Any:
         return rig.peer.call(Trigger, f"simulator/{service}", Trigger.Request())
 
-    nodes = by_hand(start, periods=20)
+    nodes = by_hand(start, periods=5)
     for letter in "sce":
         nodes[letter]()
     rig.peer.spin_until(lambda: len(rig.torque) > 300, "torques")
@@ -49,7 +49,7 @@ def test_pause_step_speed_reset_stop_and_play_by_the_command(start, rig):
     assert first == int(paused.split()[5]) + 3
     for played in (first, first + 3):
         rig.peer.spin_until(lambda: stamps(rig.torque)[-1] == played, "the last step")  # noqa: B023
-        status = f"paused: level 0, realization 0: {played} of 21000 samples; as fast as possible"
+        status = f"paused: level 0, realization 0: {played} of 6000 samples; as fast as possible"
         assert ask("status").message == status
         assert ask("step").success  # three again: the parameter stays
     rig.peer.spin_until(lambda: stamps(rig.torque)[-1] == first + 6, "the last step")
@@ -68,8 +68,8 @@ def test_pause_step_speed_reset_stop_and_play_by_the_command(start, rig):
     assert fjr(start, "speed", "max").endswith("; as fast as possible")
     rig.torque.clear()
     assert ask("play").success
-    torque = rig.hear_all_of(described(periods=20))
-    batch = run_realization(SIMULATOR.defaults(), described(periods=20))
+    torque = rig.hear_all_of(described(periods=5))
+    batch = run_realization(SIMULATOR.defaults(), described(periods=5))
     np.testing.assert_array_equal(torque, batch.torque)
 
 
@@ -191,7 +191,7 @@ def test_the_drive_lets_go_of_a_killed_controller_and_its_successor_plays_the_ne
 def test_nodes_may_be_started_again_mid_run_and_ended_in_any_order(start, rig, order):
     from std_srvs.srv import Trigger
 
-    nodes = by_hand(start, periods=6)
+    nodes = by_hand(start, periods=3)
     running = {letter: nodes[letter]() for letter in "sce"}
     rig.peer.spin_until(lambda: len(rig.torque) > 300, "torques")
     for letter in order:
@@ -199,8 +199,8 @@ def test_nodes_may_be_started_again_mid_run_and_ended_in_any_order(start, rig, o
         running[letter] = nodes[letter]()
     rig.torque.clear()
     assert rig.peer.call(Trigger, "excitation/start", Trigger.Request()).success
-    torque = rig.hear_all_of(described(periods=6))
-    batch = run_realization(SIMULATOR.defaults(), described(periods=6))
+    torque = rig.hear_all_of(described(periods=3))
+    batch = run_realization(SIMULATOR.defaults(), described(periods=3))
     np.testing.assert_array_equal(torque, batch.torque)
     for letter in reversed(order):
         assert running[letter].interrupt() == 0
@@ -239,7 +239,7 @@ def test_a_paused_campaign_is_not_called_hung(domain, tmp_path, start, monkeypat
         assert fjr(start, "play").startswith("playing: ")
 
     monkeypatch.setattr(conductor, "_STALL_S", 5.0)
-    what = campaign(base=0.1, excitation={"f_min_hz": 1.0, "f_max_hz": 40.0})
+    what = campaign(base=0.125, excitation={"f_min_hz": 1.0, "f_max_hz": 40.0})
     with Progress() as progress:
         helper = Helper(tmp_path / "graph", pause_until_it_is_noticed)
         run_campaign(what, tmp_path / "graph", progress=progress)
@@ -248,7 +248,7 @@ def test_a_paused_campaign_is_not_called_hung(domain, tmp_path, start, monkeypat
 
 
 def test_a_realization_with_a_trip_is_not_kept(domain, tmp_path, start):
-    what = campaign(base=0.04, excitation={"f_min_hz": 1.0, "f_max_hz": 40.0})
+    what = campaign(base=0.125, excitation={"f_min_hz": 1.0, "f_max_hz": 40.0})
     helper = Helper(tmp_path / "graph", lambda: fjr(start, "estop"))
     with pytest.raises(InputError, match="not kept: the controller tripped: emergency stop"):
         in_graph(what, tmp_path / "graph")

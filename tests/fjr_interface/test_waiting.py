@@ -109,7 +109,7 @@ def test_a_controller_started_again_in_mid_run_is_told_with_the_mend(start, rig)
         statuses = [status for message in heard for status in message.status]
         return any(s.level == b"\1" and text in s.message for s in statuses)
 
-    nodes = by_hand(start, periods=20)
+    nodes = by_hand(start, periods=2)
     nodes["s"](), nodes["e"]()
     controller = nodes["c"]()
     rig.peer.spin_until(lambda: len(rig.torque) > 300, "torques")
@@ -128,8 +128,8 @@ def test_a_controller_started_again_in_mid_run_is_told_with_the_mend(start, rig)
     assert again in fjr(start, "status")
     rig.torque.clear()
     assert fjr(start, "reset").endswith("the realization starts anew")
-    torque = rig.hear_all_of(described(periods=20))
-    batch = run_realization(SIMULATOR.defaults(), described(periods=20))
+    torque = rig.hear_all_of(described(periods=2))
+    batch = run_realization(SIMULATOR.defaults(), described(periods=2))
     np.testing.assert_array_equal(torque, batch.torque)
 
 
@@ -158,18 +158,20 @@ PUBLISHED = {"s": "motor_position", "c": "motor_torque", "e": "reference"}
 
 
 def test_a_second_node_is_refused_and_the_run_goes_on(start, rig, domain):
-    nodes = by_hand(start, periods=20)
+    nodes = by_hand(start, periods=2)
     for each in PUBLISHED:
         nodes[each]()
     rig.peer.spin_until(lambda: len(rig.torque) > 300, "torques")
+    rig.paces = False  # the run stands still until they are gone
     seconds = {topic: nodes[letter]() for letter, topic in PUBLISHED.items()}
     for topic, second in seconds.items():
         rig.peer.spin_until(lambda node=second: node.process.poll() is not None, f"no 2nd {topic}")
         assert second.exit_status() == 2
         assert second.output.startswith(TAKEN.format(topic, domain)), second.output
         assert second.output.count("\n") == 1
-    torque = rig.hear_all_of(described(periods=20))
-    batch = run_realization(SIMULATOR.defaults(), described(periods=20))
+    rig.paces = True
+    torque = rig.hear_all_of(described(periods=2))
+    batch = run_realization(SIMULATOR.defaults(), described(periods=2))
     np.testing.assert_array_equal(torque, batch.torque)
 
 
