@@ -46,9 +46,7 @@ def laws(joint: Joint) -> Laws:
         made.parameters[parameter.name] = (value, f"{parameter.description} ({parameter.unit})")
     made.parameters["w0"] = (SLIP_RAD_S, "Velocity of slip (rad/s)")
     _drive(joint, made)
-    if joint.one_body:
-        made.terms["te"] = "0"
-    else:
+    if not joint.one_body:
         _transmission(joint, made)
     _motor(joint, made)
     _link(joint, made)
@@ -153,13 +151,6 @@ def _motor(joint: Joint, made: Laws) -> None:
     uneven = joint.of("asymmetric_friction")
     if uneven["coulomb_nm"]:
         level += f" + {uneven['coulomb_nm']!r}*sign(w)"
-    if joint.has("load_friction"):
-        level += f" + {joint.of('load_friction')['coefficient']!r}*abs(te)"
-    if joint.has("directional_loss"):
-        loss = joint.of("directional_loss")
-        forward, backward = loss["forward"], loss["backward"]
-        mean, half = 0.5 * (forward + backward), 0.5 * (forward - backward)
-        level += f" + ({mean!r} - {half!r}*sign(te*w))*abs(te)"
     if joint.has("position_friction"):
         place = joint.of("position_friction")
         level += f" + {place['amplitude_nm']!r}*{_ripple(place, 'th')}"
@@ -169,6 +160,7 @@ def _motor(joint: Joint, made: Laws) -> None:
         viscous += f" + {square!r}*abs(w)*w"
     if uneven["viscous_nm_s_rad"]:
         viscous += f" + {uneven['viscous_nm_s_rad']!r}*abs(w)"
+    level += _losses(joint, f"({level})*tanh(w/w0) + {viscous}", made)
     made.terms["friction"] = (
         f"{_friction(joint, 'motor', 'w', f'max({level}, 0)', made)} + {viscous}"
     )
@@ -176,6 +168,28 @@ def _motor(joint: Joint, made: Laws) -> None:
     if joint.one_body:
         on_motor += _outside(joint, "th", made)
     made.states = {"th": "w", "w": f"({on_motor})/jm", **made.states}
+
+
+def _losses(joint: Joint, friction: str, made: Laws) -> str:
+    """Return the part of the motor's friction level that grows with what the gear carries, signed.
+
+    Args:
+        joint: the joint.
+        friction: of the motor without that part.
+        made: takes the torque of a rigid axis' gear; see `plant.torques.gear_load`.
+    """
+    loss = joint.of("directional_loss")
+    half = 0.5 * (loss["forward"] - loss["backward"])
+    mean = 0.5 * (loss["forward"] + loss["backward"])
+    mean += joint.of("load_friction")["coefficient"]
+    if not mean:
+        return ""
+    if joint.one_body:
+        outside = _outside(joint, "th", made)
+        made.terms["carried"] = f"0.5*(drive - ({friction}) - (load{outside}))"
+        made.terms["forward"] = "sign(carried*w)"
+        made.terms["te"] = f"-carried/(1 + 0.5*({mean!r} + {half!r}*forward)*forward)"
+    return f" + ({mean!r} - {half!r}*sign(te*w))*abs(te)"
 
 
 def _outside(joint: Joint, angle: str, made: Laws) -> str:

@@ -65,7 +65,20 @@ INTEGRATED = [n for n, t in SIMSCAPE.items() if t.kind != "refused" and n != "de
 
 @pytest.mark.parametrize("effect", INTEGRATED)
 def test_the_equations_move_as_our_simulation_does(effect: str):
-    joint = joint_of({**moderate(effect), **axis(effect)})
+    compare({**moderate(effect), **axis(effect)})
+
+
+@pytest.mark.parametrize("effects_on", [
+    ("load_friction",), ("directional_loss",), ("load_friction", "gravity"),
+    ("directional_loss", "external_spring"),
+])  # fmt: skip
+def test_the_losses_of_a_rigid_axis_move_it_as_our_simulation_does(effects_on: tuple[str, ...]):
+    compare({**moderate(*effects_on), "k0": math.inf})
+
+
+def compare(values: dict) -> None:
+    """Hold the equations of a joint against the simulated rig."""
+    joint = joint_of(values)
     rig = Rig(
         {name: joint.values[name] for name in plant.PLANT.names},
         {name: joint.values[name] for name in effects.NAMES},
