@@ -70,7 +70,7 @@ NOISY = {"noise_std_rad": 2e-5}
         ),
         (
             20_000.0,
-            4.0,
+            10.0,
             {"controller": {"torque_limit_nm": 5.0}, "simulator": {"noise_snr_db": 20.0}},
         ),
     ],
