@@ -65,7 +65,7 @@ def tasks(*numbers):
 def results(tmp_path_factory):
     """The experiments of Figs. 4, 5, 7 to 9 in a tiny version, really run, once."""
     cache = tmp_path_factory.mktemp("cache")
-    found = run_tasks(fig4.tasks(TINY), cache)
+    found = run_tasks(fig4.tasks(TINY), cache, workers=1)
     amplitude = fig4.optimum_amplitude(found, TINY)
     chosen = [
         task
@@ -74,7 +74,7 @@ def results(tmp_path_factory):
         if not task.name.startswith("fig8")  # at 20 kHz: left to fjr paper
     ]
     chosen += [task for task in fig5.tasks(TINY, amplitude) if task.name != "shaping_undamped"]
-    found |= run_tasks(chosen, cache)
+    found |= run_tasks(chosen, cache, workers=1)
     return found, amplitude
 
 
@@ -246,7 +246,7 @@ def test_no_one_g0_gives_figs_4_and_9(results):
 
 def test_fig6_says_what_is_reached_and_no_more(tmp_path: Path):
     """The paper prints axis ticks, not where its curves end, so nothing can be refuted."""
-    found = run_tasks(fig6.tasks(TINY, 7e-3), tmp_path)
+    found = run_tasks(fig6.tasks(TINY, 7e-3), tmp_path, workers=1)
     (row,) = fig6.part(found, TINY, 7e-3).statements
     reach = float(found["motion_strong"]["deflection_rad"])
     assert row.measured == f"reaches {reach:.2f} rad and {fig6.elastic(reach):.3g} N m"
@@ -255,7 +255,8 @@ def test_fig6_says_what_is_reached_and_no_more(tmp_path: Path):
 
 def test_shaping_is_repeated_at_its_best_torque(results, tmp_path: Path):
     """Several whole experiments with other phases than those that chose the torque."""
-    found = results[0] | run_tasks(fig5.torque_tasks(TINY, results[0]), tmp_path)
+    torque = fig5.torque_tasks(TINY, results[0])
+    found = results[0] | run_tasks(torque, tmp_path, workers=1)
     best = [task for task in fig5.best_tasks(TINY, found) if task.name.startswith("shaped_best")]
     assert len(best) == TINY.repeats
     v = [found[f"shaped_scale_{i}"]["v"][variant()] for i in range(len(fig5.SCALES))]
