@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
+from .outcome.verdict_words import explanation
 from .record_judgement import FEWEST_PARTS, Tested, tested_causes
 from .which.cell_fits import CellFit, CellFitter
 from .which.stepwise import Found
@@ -14,6 +15,8 @@ Progress = Callable[[str], None]
 _MAY_BE_UNSURE = 2
 SURE = 0.8
 """How surely a cause beyond the two that gain most must be present."""
+_MUCH = 0.5
+"""Share of the gap that a cause closes, from which on it is said why it is not named."""
 
 
 def kept(
@@ -36,7 +39,7 @@ def kept(
     """
     if len(fitter.evidence.parts_for("select")) < FEWEST_PARTS:
         return replace(found, steps=found.steps[:1]), []
-    steps, tested = list(found.steps), []
+    steps, tested, notes = list(found.steps), [], list(found.notes)
     if not steps[-1].solution.converged:
         steps[-1] = fitter.further(steps[-1])
     while steps[-1].effects:
@@ -48,6 +51,7 @@ def kept(
         blurred = any(t.passes_beside_size and not t.certain for t in failed)
         weakest = min(tested if blurred else failed, key=lambda t: t.gain.mean)
         before = [fit for fit in steps if weakest.effect not in fit.effects]
+        notes += _changing(weakest)
         last = weakest.without
         same = last.effects == before[-1].effects
         if not same:
@@ -58,7 +62,18 @@ def kept(
         tested = []
     if tested and any(len(fit.effects) != count for count, fit in enumerate(steps)):
         steps = [steps[0], *_one_by_one(fitter, steps[-1], tested)]
-    return replace(found, steps=steps), tested
+    return replace(found, steps=steps, notes=tuple(notes)), tested
+
+
+def _changing(tested: Tested) -> list[str]:
+    """Return the sentence on a cause that closes much, but not with the same size at all levels."""
+    if tested.invariant or not tested.gain.present or not tested.share.value >= _MUCH:
+        return []
+    return [
+        f"{explanation([tested.effect]).capitalize()} would close {tested.share.value:.0%} of what "
+        "the refit left, but not with the same size at all levels "
+        f"(p = {tested.invariance_p:.1g}), so it is not named: what is there follows another law."
+    ]
 
 
 def _begun_anew(fitter: CellFitter, fit: CellFit, before: CellFit) -> CellFit:

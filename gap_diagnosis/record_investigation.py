@@ -239,7 +239,7 @@ def _notes(evidence: Evidence, found: Found) -> list[str]:
 
 def _notes_of_fit(found: Found) -> list[str]:
     best = found.best
-    notes = at_limits(best.space, best.solution.x, best.model.plant)
+    notes = [*found.notes, *at_limits(best.space, best.solution.x, best.model.plant)]
     if best.effects and not best.solution.converged:
         notes.append(
             f"The fit of {' + '.join(best.effects)} has not converged: the sizes, and their "

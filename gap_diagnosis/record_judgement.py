@@ -91,11 +91,15 @@ class Tested:
     @property
     def passes_beside_size(self) -> bool:
         """Whether it passes all tests but that of its own size, which another cause may blur."""
-        same = self.invariance_p is None or self.invariance_p >= LEAST_INVARIANCE_P
         closes = self._closes
         least = LEAST_PRESENT if self.certain else _UNCERTAIN * LEAST_PRESENT
         there = self.gain.present and closes and not self.bounded
-        return there and same and self.present >= least
+        return there and self.invariant and self.present >= least
+
+    @property
+    def invariant(self) -> bool:
+        """Whether its size may be the same at all levels."""
+        return self.invariance_p is None or self.invariance_p >= LEAST_INVARIANCE_P
 
     @property
     def _closes(self) -> bool:
@@ -126,7 +130,7 @@ class Tested:
         sure *= doubt_of_shape(self.ripples)
         if not self.certain or self.bounded:
             sure *= _UNCERTAIN
-        if self.invariance_p is not None and self.invariance_p < LEAST_INVARIANCE_P:
+        if not self.invariant:
             sure *= 0.5
         return min(sure, 0.99)
 

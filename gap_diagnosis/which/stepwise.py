@@ -54,12 +54,14 @@ class Found:
         rivals: fits that were tried at each step, by the number of causes.
         alternatives: for each cause what does as well in its place.
         complete: whether the search ended by itself, not by its budget.
+        notes: sentences on what was found but is not named.
     """
 
     steps: list[CellFit]
     rivals: dict[int, list[CellFit]] = field(default_factory=dict)
     alternatives: dict[str, list[str]] = field(default_factory=dict)
     complete: bool = True
+    notes: tuple[str, ...] = ()
 
     @property
     def best(self) -> CellFit:

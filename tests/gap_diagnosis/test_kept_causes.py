@@ -9,7 +9,7 @@ import pytest
 from test_evidence import NOMINAL, SCATTER, records
 
 from gap_diagnosis import record_judgement
-from gap_diagnosis.kept_causes import SURE, _guesses, _one_by_one, kept
+from gap_diagnosis.kept_causes import SURE, _changing, _guesses, _one_by_one, kept
 from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.outcome.diagnosis import Estimate
 from gap_diagnosis.which.cell_fits import CellFitter
@@ -55,6 +55,17 @@ def test_steps_end_at_the_fit_itself(searched):
     assert [len(fit.effects) for fit in steps] == [1, 2, 3]
     assert steps[-1].model is fits[3].model
     assert all(set(a.effects) < set(b.effects) for a, b in itertools.pairwise(steps))
+
+
+def test_why_a_cause_that_closes_much_is_not_named_is_said(searched):
+    fitter, fits = searched
+    tested = record_judgement.tested_causes(fitter, fits[3], fits[0], SCATTER)
+    greatest = max(tested, key=lambda t: t.share.value)
+    assert greatest.share.value > 0.5 and _changing(greatest) == []
+    (said,) = _changing(replace(greatest, invariance_p=1e-4))
+    assert "not with the same size at all levels (p = 0.0001)" in said
+    least = min(tested, key=lambda t: t.share.value)
+    assert least.share.value < 0.5 and _changing(replace(least, invariance_p=1e-4)) == []
 
 
 def test_a_third_cause_must_be_sure(searched):
