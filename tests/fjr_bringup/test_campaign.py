@@ -67,7 +67,8 @@ def test_realizations_are_played_in_the_order_that_the_description_gives(order, 
 def test_options_win_over_settings_and_these_over_the_file(tmp_path):
     rig = tmp_path / "rig.yaml"
     rig.write_text("/rig/simulator: {ros__parameters: {k1: 5.0, fs: 1.0}}\n")
-    arguments = ["--rig", str(rig), "--out", "x", "--set", "simulator.k1=7", *SHORT]
+    own = ["--rig", str(rig), "--set", "simulator.k1=7", "--workers", "1"]
+    arguments = [*own, "--out", "x", *SHORT]
     done = fjr("simulate", *arguments, "--set", "excitation.seed=3", "--seed", "4", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     values = Campaign.create(tmp_path / "x" / "campaign.yaml").values
@@ -113,7 +114,7 @@ def test_a_folder_with_something_else_is_refused(run, tmp_path):
 
 
 THREE = [
-    *("--realizations", "3", "--periods", "1"),
+    *("--realizations", "3", "--periods", "1", "--workers", "1"),
     *("--set", "excitation.base_frequency_hz=1", "--set", "excitation.f_min_hz=1"),
 ]
 
@@ -156,8 +157,8 @@ def test_interrupted_run_keeps_bags_and_resumes_to_the_same_bytes(
     tmp_path, start: Starter, signal_number
 ):
     options = ["--realizations", "3", "--periods", "3", "--transient-periods", "0",
-               "--set", "excitation.base_frequency_hz=0.25",
-               "--set", "excitation.f_min_hz=0.25"]  # fmt: skip
+               "--set", "excitation.base_frequency_hz=0.5",
+               "--set", "excitation.f_min_hz=0.5"]  # fmt: skip
     out = tmp_path / "x"
     run = start("fjr_cli", "run", "--out", str(out), *options)
     first, second = bag_folder(out, 0, 0), out / f".{bag_folder(out, 0, 1).name}.partial"
@@ -227,7 +228,7 @@ def test_settings_are_typed_as_ros_does():
 def test_demo_ends_with_its_report_and_a_second_one_keeps_the_bags(
     run, tmp_path, domain, monkeypatch
 ):
-    excitation = {**DEMO["excitation"], "base_frequency_hz": 0.5, "f_min_hz": 0.5}
+    excitation = {**DEMO["excitation"], "base_frequency_hz": 2.0, "f_min_hz": 2.0}
     monkeypatch.setitem(DEMO, "excitation", excitation)
     report = tmp_path / "demo" / "analysis" / "report.html"
     done = run("demo", "--out", tmp_path / "demo")

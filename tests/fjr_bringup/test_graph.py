@@ -41,7 +41,7 @@ MODULES = {
                 "m": 2,
             },
         ),
-        (20_000.0, 4.0, {"controller": {"torque_limit_nm": 5.0}}),
+        (20_000.0, 10.0, {"controller": {"torque_limit_nm": 5.0}}),
     ],
     ids=[
         "100 Hz, noise by std, link encoder",
@@ -126,7 +126,7 @@ def test_a_node_that_ends_at_its_start_is_named_with_what_it_said(domain, tmp_pa
 
 
 def test_a_slow_recorder_slows_the_lockstep_and_loses_nothing(domain, tmp_path, monkeypatch):
-    what = campaign(base=0.1, excitation={"f_min_hz": 1.0, "f_max_hz": 40.0})
+    what = campaign(base=0.125, excitation={"f_min_hz": 1.0, "f_max_hz": 40.0})
     assert what.experiment(0, 0).samples > 5 * SIGNAL_DEPTH
     poll = Recorder.poll
     polls = []
@@ -188,7 +188,9 @@ def test_a_watcher_in_the_domain_does_not_disturb(domain, tmp_path, peer: Peer):
 def test_a_second_campaign_in_the_domain_is_refused_and_the_first_goes_on(
     domain, tmp_path, start: Starter
 ):
-    options = ["--out", str(tmp_path / "first"), "--periods", "1", "--realizations", "1"]
+    options = ["--out", str(tmp_path / "first"), "--periods", "1", "--realizations", "1",
+               "--set", "excitation.base_frequency_hz=0.5",
+               "--set", "excitation.f_min_hz=0.5"]  # fmt: skip
     first = start("fjr_cli", "run", *options)
     first.wait_for_text(f"ROS domain {domain}; discovery stays on this machine.")
     with pytest.raises(InputError, match=f"Another campaign runs in ROS domain {domain}; wait"):
@@ -220,7 +222,7 @@ def test_a_late_foreign_recorder_does_not_disturb_and_gets_the_description(
 
     latched = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     never = peer.listen(JointState, "motor_position", latched)  # nobody offers that
-    band = {"base_frequency_hz": 0.1, "f_min_hz": 1.0, "f_max_hz": 40.0}
+    band = {"base_frequency_hz": 0.2, "f_min_hz": 1.0, "f_max_hz": 40.0}
     settings = [word for name, f in band.items() for word in ("--set", f"excitation.{name}={f}")]
     folder = tmp_path / "campaign"
     options = ["--out", str(folder), "--realizations", "1", "--periods", "1", *settings]
