@@ -42,6 +42,7 @@ def original(tmp_path_factory) -> Path:
     settings = ["excitation.base_frequency_hz=0.5", "excitation.f_min_hz=0.5"]
     settings += ["excitation.f_max_hz=60.0", "simulator.noise_std_rad=1e-5"]
     options = [part for setting in settings for part in ("--set", setting)]
+    options += ["--workers", "1"]
     run("simulate", "--out", folder, "--realizations", 3, "--periods", 2, *options)
     return folder
 
