@@ -83,7 +83,7 @@ def test_start_mid_run_replaces_the_run(start, rig):
     from rcl_interfaces.srv import SetParameters
     from std_srvs.srv import Trigger
 
-    nodes = by_hand(start, periods=20)
+    nodes = by_hand(start, periods=5)
     for letter in "sce":
         nodes[letter]()
     for realization in (1, 2, 1):
@@ -95,7 +95,7 @@ def test_start_mid_run_replaces_the_run(start, rig):
         assert answer.results[0].successful
         answer = rig.peer.call(Trigger, "excitation/start", Trigger.Request())
         assert answer.success and answer.message == f"level 0, realization {realization}"
-    experiment = described(periods=20, realization=1)
+    experiment = described(periods=5, realization=1)
     torque = rig.hear_all_of(experiment)
     np.testing.assert_array_equal(torque, run_realization(SIMULATOR.defaults(), experiment).torque)
 
