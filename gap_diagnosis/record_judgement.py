@@ -6,6 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from .how_far.record_ledger import Ledger
 from .model.evidence import Evidence
 from .model.simulated_rig import Model
@@ -26,6 +28,8 @@ from .which.cell_fits import CellFit, CellFitter
 from .which.gains import Gain, closed, fall, gain
 from .which.presence import (
     LEAST_INVARIANCE_P,
+    SAME_WORTH,
+    Invariance,
     at_its_bound,
     beyond_zero,
     cell_estimates,
@@ -63,7 +67,9 @@ class Tested:
         effect: its identifier.
         gain: what leaving it out loses on unseen parts.
         without: the fit that lacks it.
-        invariance_p: see `invariance`; None with one level.
+        invariance_p: see `Invariance`; None with one level.
+        own_sizes: how much a size of its own at each level would close beyond, of what it closes,
+            on unseen parts; 0 where chance explains that sizes differ.
         certain: whether the interval of its size lacks zero.
         bounded: whether a parameter lies where the fit may go no further.
         share: how much of what the refit left comes back without it, on unseen parts that select.
@@ -82,6 +88,7 @@ class Tested:
     left: float
     in_band: float
     ripples: float = math.inf
+    own_sizes: float = 0.0
 
     @property
     def passed(self) -> bool:
@@ -98,8 +105,9 @@ class Tested:
 
     @property
     def invariant(self) -> bool:
-        """Whether its size may be the same at all levels."""
-        return self.invariance_p is None or self.invariance_p >= LEAST_INVARIANCE_P
+        """Whether its size may be the same at all levels, or differs by what closes no more."""
+        chance = self.invariance_p is None or self.invariance_p >= LEAST_INVARIANCE_P
+        return chance or self.own_sizes <= SAME_WORTH
 
     @property
     def _closes(self) -> bool:
@@ -153,21 +161,35 @@ def tested_causes(
     left = squares[0] / max(squares[1], 1e-300)
     found = []
     for effect, without in fewer.items():
+        sizes = invariance(fitter, fit, effect, scatter)
         found.append(
             Tested(
                 effect,
                 gain(fitter, fit, without, fitter.acted(fit, effect)),
                 without,
-                invariance(fitter, fit, effect, scatter),
+                None if sizes is None else sizes.p,
                 beyond_zero(effect, estimates, fall(fitter, fit, without)),
                 at_its_bound(fit, effect),
                 ledger.share(without.model, fit.model, refit.model),
                 left,
                 closed(fitter, fit, without),
                 ripples_passed(fit.model, effect, fitter.scales),
+                _own_sizes(ledger, fit, without, sizes),
             )
         )
     return found
+
+
+def _own_sizes(ledger: Ledger, fit: CellFit, without: CellFit, sizes: Invariance | None) -> float:
+    """Return what `Tested.own_sizes` is."""
+    if sizes is None or sizes.p >= LEAST_INVARIANCE_P:
+        return 0.0
+    common, bare = ledger.squares(fit.model), ledger.squares(without.model)
+    level = np.array([ledger.evidence.parts[p].level for p in ledger.parts])
+    beyond = 0.0
+    for one, model in sizes.own.items():
+        beyond += float((common - ledger.squares(model))[level == one].sum())
+    return beyond / max(float((bare - common).sum()), 1e-300)
 
 
 def judge_records(

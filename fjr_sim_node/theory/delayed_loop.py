@@ -15,7 +15,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from scipy.optimize import brentq
+from scipy.optimize import root
 
 from controller_node.transfer_function import TransferFunction
 
@@ -96,35 +96,52 @@ def delay_margin(
 ) -> float:
     """Return the least constant delay (s) at which the linear loop is no longer stable.
 
-    Found at the gain crossovers as phase margin over frequency, then refined by the poles of the
-    sampled loop.
+    There a pole lies on the unit circle. It is sought from each gain crossover, where phase margin
+    over frequency is that delay, but for the part of a sample by which the older torque still acts.
 
     Returns:
         0 if it is not stable without delay either, infinity if its gain stays below 1.
     """
-
-    def excess(delay_s: float) -> float:
-        return spectral_radius(parameters, law, sample_rate_hz, delay_s) - 1.0
-
-    if excess(0.0) >= 0.0:
+    if spectral_radius(parameters, law, sample_rate_hz, 0.0) >= 1.0:
         return 0.0
-    high = _phase_margin_s(parameters, law, sample_rate_hz)
-    if math.isinf(high):
-        return high
-    low = 0.0
-    while excess(high) < 0.0:
-        low, high = high, 1.1 * high
-    return float(brentq(excess, low, high, xtol=1e-9))
+    near = _phase_margins(parameters, law, sample_rate_hz)
+    return min(
+        (_on_the_circle(parameters, law, sample_rate_hz, *at) for at in near), default=math.inf
+    )
 
 
-def _phase_margin_s(
-    parameters: Mapping[str, Any], law: TransferFunction, sample_rate_hz: float
+def _on_the_circle(
+    parameters: Mapping[str, Any],
+    law: TransferFunction,
+    sample_rate_hz: float,
+    frequency_hz: float,
+    delay_s: float,
 ) -> float:
-    """Return the least phase margin over frequency of all gain crossovers (s)."""
+    """Return the delay (s) near one at which a pole lies on the unit circle, near a frequency.
+
+    That is where 1 + C_y G0 is zero; the delay itself where no such delay is found.
+    """
+
+    def characteristic(at: np.ndarray) -> list[float]:
+        frequency = np.array([frequency_hz * math.exp(at[0])])
+        delay = max(delay_s + at[1] / frequency_hz, 0.0)
+        plant = delayed_g0(parameters, frequency, sample_rate_hz, np.array([delay]))
+        value = complex((1.0 + law.response(frequency, sample_rate_hz)[1] * plant)[0])
+        return [value.real, value.imag]
+
+    found = root(characteristic, np.zeros(2), tol=1e-12)
+    return max(delay_s + float(found.x[1]) / frequency_hz, 0.0) if found.success else delay_s
+
+
+def _phase_margins(
+    parameters: Mapping[str, Any], law: TransferFunction, sample_rate_hz: float
+) -> list[tuple[float, float]]:
+    """Return frequency (Hz) and phase margin over it (s) of all gain crossovers."""
     frequency_hz = np.geomspace(1e-4, 0.5, _FREQUENCIES) * sample_rate_hz
     _, controller = law.response(frequency_hz, sample_rate_hz)
     loop = controller * g0(parameters, frequency_hz, sample_rate_hz)
     above = np.abs(loop) > 1.0
     crossovers = np.flatnonzero(above[1:] != above[:-1])
     margin = np.mod(np.angle(loop[crossovers]) + np.pi, 2.0 * np.pi)
-    return float((margin / (2.0 * np.pi * frequency_hz[crossovers])).min(initial=math.inf))
+    delay_s = margin / (2.0 * np.pi * frequency_hz[crossovers])
+    return list(zip(frequency_hz[crossovers].tolist(), delay_s.tolist(), strict=True))

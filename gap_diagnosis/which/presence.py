@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy import stats
 
 from fjr_sim_node import effects as fx
 
+from ..model.simulated_rig import Model
 from ..outcome.diagnosis import Estimate
 from .cell_fits import CellFit, CellFitter
 from .estimates import (
@@ -31,6 +33,9 @@ from .fits import Fit
 from .gains import fall
 
 LEAST_INVARIANCE_P = 0.01
+SAME_WORTH = 0.01
+"""Of what a cause closes: sizes of its own at each level that would close no more than this beyond
+are one size. Sizes a tenth above and below one common size would."""
 _SAME = 0.05  # relative: sizes that differ by no more are the same, since friction scatters
 _AT_BOUND = 1e-3  # relative
 
@@ -95,10 +100,23 @@ def at_its_bound(fit: CellFit | Fit, effect: str) -> bool:
     return False
 
 
+@dataclass(frozen=True)
+class Invariance:
+    """Whether an effect has one size at all levels.
+
+    Attributes:
+        p: how often chance makes its sizes differ so much between levels.
+        own: models by level in which the size that differs most is free at each.
+    """
+
+    p: float
+    own: Mapping[int, Model]
+
+
 def invariance(
     fitter: CellFitter, fit: CellFit, effect: str, scatter: Mapping[str, float]
-) -> float | None:
-    """Return how often chance makes an effect's size differ so much between levels.
+) -> Invariance | None:
+    """Return whether an effect has one size at all levels.
 
     The sizes are free at each level while all else is common, to first order; their covariance is
     robust to what is alike within a part (sandwich estimate by clusters). It rests on few parts, so
@@ -112,7 +130,7 @@ def invariance(
         scatter: standard deviations of parameters from run to run, see `moved_by_scatter`.
 
     Returns:
-        p-value of the Wald test that they are equal; None with one level.
+        with the p-value of the Wald test that they are equal; None with one level.
     """
     evidence = fitter.evidence
     level = np.array([evidence.parts[p].level for p in fitter.groups])
@@ -124,17 +142,17 @@ def invariance(
     if np.unique(level).size < 2 or not columns:
         return None
     change = deviations(fit, scatter)
-    least = 1.0
-    for column in columns:
-        p = _equal(fit, column, level, fitter, change)
-        if p is not None:
-            least = min(least, p * len(columns))
-    return min(least, 1.0)
+    found = [_equal(fit, column, level, fitter, change) for column in columns]
+    acting = [one for one in found if one is not None]
+    if not acting:
+        return Invariance(1.0, {})
+    least = min(acting, key=lambda one: one.p)
+    return Invariance(min(least.p * len(columns), 1.0), least.own)
 
 
 def _equal(
     fit: CellFit, column: int, level: np.ndarray, fitter: CellFitter, change: np.ndarray
-) -> float | None:
+) -> Invariance | None:
     jacobian, residuals, groups = fit.solution.jacobian, fit.solution.residuals, fitter.groups
     own, levels = jacobian[:, column], np.unique(level)
     if not own.any():
@@ -159,7 +177,10 @@ def _equal(
     difference = contrast @ values
     statistic = float(difference @ np.linalg.pinv(contrast @ spread @ contrast.T) @ difference)
     blocks = min(np.unique(groups[level == one]).size for one in levels)
-    return float(stats.f.sf(statistic / (k - 1), k - 1, max(blocks - 1, 1)))
+    p = float(stats.f.sf(statistic / (k - 1), k - 1, max(blocks - 1, 1)))
+    at = [np.insert(np.delete(fit.solution.x, column) + step[k:], column, v) for v in values]
+    models = [fit.space.model(np.clip(x, *fit.space.bounds())) for x in at]
+    return Invariance(p, dict(zip(levels.tolist(), models, strict=True)))
 
 
 def where_it_acts(

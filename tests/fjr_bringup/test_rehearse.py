@@ -34,11 +34,7 @@ CALM = """
 /rig/controller:
   ros__parameters: {p: 10.0, d: 1.0, position_timeout_s: 5.0, reference_timeout_s: 5.0}
 """
-"""Limits that a busy machine keeps, and a loop that only a delay of 0.9 s makes unstable.
-
-A calmer one bears more delay, and the poles that its margin is found by are as many as the samples
-of that: at 5 s they took a minute.
-"""
+"""Limits that a busy machine keeps, and a loop that a late torque does not make unstable."""
 
 
 @pytest.fixture

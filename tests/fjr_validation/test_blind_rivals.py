@@ -6,14 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from controller_node.law import law_of
+from controller_node.law import as_transfer_function, law_of
 from fjr_interface.bags.folder_names import bag_folder
 from fjr_interface.bags.writer import BagWriter
 from fjr_interface.experiment import RecordDescription
 from fjr_kit.errors import InputError
 from fjr_sim_node import effects as fx
 from fjr_sim_node import plant
-from fjr_sim_node.simulation.closed_loop import simulate
+from fjr_sim_node.simulation.closed_loop import simulate, simulate_law
 from fjr_validation.blind import baseline_fit, methods
 from fjr_validation.blind.answers import Answer
 from fjr_validation.blind.bam import LADDER, NAMES, bam
@@ -51,6 +51,14 @@ def recorded(folder: Path, values: dict[str, float], noise_rad: float = 1e-6) ->
             with BagWriter(bag_folder(folder, level, run), description) as writer:
                 writer.write_arrays(r=r, y=played.position, u=played.torque)
     return folder
+
+
+@pytest.fixture(scope="module", autouse=True)
+def compiled():
+    """Compile the kernels before anything has a budget: it is one of processor time."""
+    law = as_transfer_function(law_of(CONTROLLER, RATE))
+    for e in (None, fx.coefficients({"torque_bias.torque_nm": 0.1})):
+        simulate_law(np.zeros(2), RATE, plant.coefficients(RIGID), law, effects=e)
 
 
 @pytest.fixture(autouse=True)

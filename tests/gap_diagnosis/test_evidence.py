@@ -226,14 +226,14 @@ def test_a_cause_without_which_nothing_of_the_gap_comes_back_is_not_present():
 
 def test_a_true_cause_is_the_same_at_all_levels_and_a_substitute_is_not():
     fitter, _, fit = biased()
-    assert invariance(fitter, fit, "torque_bias", {}) > 0.01
+    assert invariance(fitter, fit, "torque_bias", {}).p > 0.01
     # A size that is wrong at one level: the residuals of that level are those of another bias.
     level = np.array([fitter.evidence.parts[p].level for p in fitter.groups])
     column = len(fit.space.nominal)
     shift = np.where(level == 1, 0.5 * fit.solution.x[column], 0.0)
     moved = fit.solution.residuals + shift * fit.solution.jacobian[:, column]
     wrong = replace(fit, solution=replace(fit.solution, residuals=moved))
-    assert invariance(fitter, wrong, "torque_bias", {}) < 1e-3
+    assert invariance(fitter, wrong, "torque_bias", {}).p < 1e-3
 
 
 @pytest.mark.parametrize(("stated", "words"), [(1.0, None), (3.0, "(jm 41 % below it)")])

@@ -62,10 +62,12 @@ def test_why_a_cause_that_closes_much_is_not_named_is_said(searched):
     tested = record_judgement.tested_causes(fitter, fits[3], fits[0], SCATTER)
     greatest = max(tested, key=lambda t: t.share.value)
     assert greatest.share.value > 0.5 and _changing(greatest) == []
-    (said,) = _changing(replace(greatest, invariance_p=1e-4))
+    (said,) = _changing(replace(greatest, invariance_p=1e-4, own_sizes=0.1))
     assert "not with the same size at all levels (p = 0.0001)" in said
     least = min(tested, key=lambda t: t.share.value)
-    assert least.share.value < 0.5 and _changing(replace(least, invariance_p=1e-4)) == []
+    other = replace(least, invariance_p=1e-4, own_sizes=0.1)
+    assert other.share.value < 0.5 and not other.invariant and _changing(other) == []
+    assert replace(greatest, invariance_p=1e-4, own_sizes=0.005).invariant
 
 
 def test_a_third_cause_must_be_sure(searched):
