@@ -6,7 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 from .outcome.verdict_words import explanation
-from .record_judgement import FEWEST_PARTS, Tested, tested_causes
+from .record_judgement import FEWEST_PARTS
+from .tested_causes import Tested, causes_with_tests
 from .which.cell_fits import CellFit, CellFitter
 from .which.stepwise import Found
 
@@ -44,7 +45,7 @@ def kept(
         steps[-1] = fitter.further(steps[-1])
     while steps[-1].effects:
         progress(f"tests of {' + '.join(steps[-1].effects)}")
-        tested = tested_causes(fitter, steps[-1], steps[0], scatter)
+        tested = causes_with_tests(fitter, steps[-1], steps[0], scatter)
         failed = [t for t in tested if not t.passed] or _guesses(tested)
         if not failed:
             break

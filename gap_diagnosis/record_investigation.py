@@ -25,7 +25,8 @@ from .model.simulated_rig import Model
 from .notes import at_limits
 from .outcome.diagnosis import Bags, Diagnosis
 from .outcome.verdict_words import OUT_OF_TIME
-from .record_judgement import Tested, judge_records
+from .record_judgement import judge_records
+from .tested_causes import Tested
 from .torque_timing import Timing, timed
 from .which.catalogue import catalogue
 from .which.cell_fits import CellFit, CellFitter

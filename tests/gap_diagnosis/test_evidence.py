@@ -14,12 +14,12 @@ from fjr_records.records import Record, RecordSet
 from fjr_sim_node import effects as fx
 from fjr_sim_node.plant import PLANT, coefficients
 from fjr_sim_node.simulation.closed_loop import simulate
-from gap_diagnosis import record_judgement
 from gap_diagnosis.gates.bag_deviations import GROUPS
 from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.model.simulated_rig import Model
 from gap_diagnosis.notes import at_limits
 from gap_diagnosis.outcome.diagnosis import Figure
+from gap_diagnosis.tested_causes import causes_with_tests
 from gap_diagnosis.which import unseen_friction
 from gap_diagnosis.which.cell_fits import CellFitter
 from gap_diagnosis.which.cell_weights import independent
@@ -208,7 +208,7 @@ def test_an_offset_promises_more_than_one_line_of_many(bias):
 
 def test_a_cause_without_which_nothing_of_the_gap_comes_back_is_not_present():
     fitter, refit, fit = biased()
-    (tested,) = record_judgement.tested_causes(fitter, fit, refit, SCATTER)
+    (tested,) = causes_with_tests(fitter, fit, refit, SCATTER)
     little = Figure(value=0.01, low=0.005, high=0.015)
     closes_little = replace(tested, in_band=0.01, share=little)
     assert replace(tested, in_band=0.01).passed  # it closes the gap as a whole

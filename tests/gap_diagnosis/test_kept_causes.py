@@ -8,10 +8,10 @@ from dataclasses import replace
 import pytest
 from test_evidence import NOMINAL, SCATTER, records
 
-from gap_diagnosis import record_judgement
 from gap_diagnosis.kept_causes import SURE, _changing, _guesses, _one_by_one, kept
 from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.outcome.diagnosis import Estimate
+from gap_diagnosis.tested_causes import causes_with_tests
 from gap_diagnosis.which.cell_fits import CellFitter
 from gap_diagnosis.which.gains import Gain
 from gap_diagnosis.which.presence import beyond_zero
@@ -50,7 +50,7 @@ def test_what_is_left_after_a_first_cause_was_taken_out_is_shown_cause_after_cau
 
 def test_steps_end_at_the_fit_itself(searched):
     fitter, fits = searched
-    tested = record_judgement.tested_causes(fitter, fits[3], fits[0], SCATTER)
+    tested = causes_with_tests(fitter, fits[3], fits[0], SCATTER)
     steps = _one_by_one(fitter, fits[3], tested)
     assert [len(fit.effects) for fit in steps] == [1, 2, 3]
     assert steps[-1].model is fits[3].model
@@ -59,7 +59,7 @@ def test_steps_end_at_the_fit_itself(searched):
 
 def test_why_a_cause_that_closes_much_is_not_named_is_said(searched):
     fitter, fits = searched
-    tested = record_judgement.tested_causes(fitter, fits[3], fits[0], SCATTER)
+    tested = causes_with_tests(fitter, fits[3], fits[0], SCATTER)
     greatest = max(tested, key=lambda t: t.share.value)
     assert greatest.share.value > 0.5 and _changing(greatest) == []
     (said,) = _changing(replace(greatest, invariance_p=1e-4, own_sizes=0.1))
@@ -72,7 +72,7 @@ def test_why_a_cause_that_closes_much_is_not_named_is_said(searched):
 
 def test_a_third_cause_must_be_sure(searched):
     fitter, fits = searched
-    tested = record_judgement.tested_causes(fitter, fits[3], fits[0], SCATTER)
+    tested = causes_with_tests(fitter, fits[3], fits[0], SCATTER)
     gains = [Gain(mean, mean, 1.0, 1e-4) for mean in (30.0, 20.0, 10.0)]
     sure = [replace(t, gain=g, in_band=0.99) for t, g in zip(tested, gains, strict=True)]
     guess = replace(sure[2], in_band=0.5, share=replace_share(sure[2].share))
