@@ -32,7 +32,7 @@ def diagnose(
     out: Annotated[Path | None, results_folder("REAL_FOLDER/diagnosis")] = None,
     tolerance: Annotated[float, datasheet_tolerance()] = 0.1,
     effects: Annotated[
-        str | None, effect_names("Look for these effects only; default: the catalogue.")
+        list[str] | None, effect_names("Look for these effects only; default: the catalogue.")
     ] = None,
     budget: Annotated[
         float | None,

@@ -49,7 +49,7 @@ def export(
             "the error.",
         ),
     ] = None,
-    without: Annotated[str | None, effect_names("Effects to leave out.")] = None,
+    without: Annotated[list[str] | None, effect_names("Effects to leave out.")] = None,
     signal_map: MapSignals = None,
 ) -> None:
     """Export the joint to a simulator or control tool, and replay recorded runs in it."""

@@ -66,7 +66,7 @@ def plan(
         ),
     ] = None,
     effects: Annotated[
-        str | None, effect_names("Look at these effects only; default: the catalogue.", SHOWN)
+        list[str] | None, effect_names("Look at these effects only; default: the catalogue.", SHOWN)
     ] = None,
     tolerance: Annotated[float, datasheet_tolerance(SHOWN)] = 0.1,
     out: Annotated[

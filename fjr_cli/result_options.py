@@ -27,6 +27,6 @@ def datasheet_tolerance(panel: str | None = None) -> Any:
     )
 
 
-def names_in(text: str | None) -> list[str] | None:
-    """Return the names of an option that separates them by commas; None if it is not given."""
-    return None if text is None else [name.strip() for name in text.split(",")]
+def names_in(given: list[str] | None) -> list[str] | None:
+    """Return the names of an option, given once with commas or several times; None if it is not."""
+    return [name.strip() for text in given for name in text.split(",")] if given else None

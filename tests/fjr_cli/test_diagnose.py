@@ -137,3 +137,13 @@ def test_ctrl_c_leaves_an_earlier_diagnosis_as_it_was(bags, start_program, tmp_p
     assert "Interrupted: nothing was written" in run.errors
     assert run.output == "" and (out / "diagnosis.json").read_text() == "earlier"
     assert [path.name for path in out.iterdir()] == ["diagnosis.json"]
+
+
+@pytest.mark.parametrize("names", [
+    ["gravity,backlsh"], ["gravity", "--effects", "backlsh"], ["backlsh", "--effects", "gravity"],
+])  # fmt: skip
+def test_effects_may_be_named_at_once_or_one_by_one(run, bags, tmp_path, names):
+    done = run(
+        "diagnose", bags, "--nominal", "paper", "--out", tmp_path / "out", "--effects", *names
+    )
+    refused(done, "backlsh", "backlash")
