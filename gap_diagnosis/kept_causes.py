@@ -9,7 +9,7 @@ from .outcome.verdict_words import explanation
 from .record_judgement import FEWEST_PARTS
 from .tested_causes import Tested, causes_with_tests
 from .which.cell_fits import CellFit, CellFitter
-from .which.stepwise import Found
+from .which.found import Found
 
 Progress = Callable[[str], None]
 

@@ -32,9 +32,10 @@ from .which.catalogue import catalogue
 from .which.cell_fits import CellFit, CellFitter
 from .which.equivalents import founded, partners
 from .which.estimates import moved_by_scatter, relative_scatter
+from .which.found import Found
 from .which.gains import gain, stands_for
 from .which.search_space import TOLERANCE
-from .which.stepwise import Found, Stepwise
+from .which.stepwise import Stepwise
 from .which.unseen_friction import SCATTER
 
 Progress = Callable[[str], None]

@@ -22,12 +22,13 @@ from .outcome.diagnosis import (
 )
 from .tested_causes import Tested
 from .which.cell_fits import CellFitter
+from .which.found import Found
 from .which.gains import gain
 from .which.presence import (
     cell_estimates,
     where_it_acts,
 )
-from .which.stepwise import NOTHING_LEFT, Found
+from .which.stepwise import NOTHING_LEFT
 
 PLAIN = 4.0
 """The same for the refit where no effect gains anything."""

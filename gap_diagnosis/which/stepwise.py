@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 
 from fjr_sim_node import effects as fx
 
 from .cell_fits import CellFit, CellFitter
 from .equivalents import ONE_CAUSE, founded, holders, partners, plainness
+from .found import Found
 from .gains import Gain, closed, gain, left_of, stands_for
 from .harmonics import with_second_harmonic
 from .presence import at_its_bound
@@ -43,30 +43,6 @@ _MUCH_LESS = 0.3  # of the greatest gain: a cause that gains less waits for the 
 _START_LESS = 0.2  # of the greatest gain of a start: an effect whose best one gains less waits
 
 Progress = Callable[[str], None]
-
-
-@dataclass
-class Found:
-    """What the stepwise search found.
-
-    Attributes:
-        steps: the refit, then one fit for each cause that was added.
-        rivals: fits that were tried at each step, by the number of causes.
-        alternatives: for each cause what does as well in its place.
-        complete: whether the search ended by itself, not by its budget.
-        notes: sentences on what was found but is not named.
-    """
-
-    steps: list[CellFit]
-    rivals: dict[int, list[CellFit]] = field(default_factory=dict)
-    alternatives: dict[str, list[str]] = field(default_factory=dict)
-    complete: bool = True
-    notes: tuple[str, ...] = ()
-
-    @property
-    def best(self) -> CellFit:
-        """The last step."""
-        return self.steps[-1]
 
 
 class Stepwise:

@@ -13,9 +13,10 @@ from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.record_investigation import LOST, RecordInvestigation, investigate_records
 from gap_diagnosis.which.cell_fits import CellFitter
 from gap_diagnosis.which.equivalents import founded
+from gap_diagnosis.which.found import Found
 from gap_diagnosis.which.gains import left_of
 from gap_diagnosis.which.presence import LEAST_INVARIANCE_P, at_its_bound, invariance
-from gap_diagnosis.which.stepwise import Found, Stepwise
+from gap_diagnosis.which.stepwise import Stepwise
 
 BARE = {**NOMINAL, "fs": 0.0, "fsm": 0.0, "fv": 0.0, "fvm": 0.0}
 LOOKED_FOR = (

@@ -13,9 +13,9 @@ from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.outcome.diagnosis import Estimate
 from gap_diagnosis.tested_causes import causes_with_tests
 from gap_diagnosis.which.cell_fits import CellFitter
+from gap_diagnosis.which.found import Found
 from gap_diagnosis.which.gains import Gain
 from gap_diagnosis.which.presence import beyond_zero
-from gap_diagnosis.which.stepwise import Found
 
 CAUSES = {"torque_bias.torque_nm": 4.0, "delay.time_s": 1e-3}
 
