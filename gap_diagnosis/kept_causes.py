@@ -90,7 +90,7 @@ def _begun_anew(fitter: CellFitter, fit: CellFit, before: CellFit) -> CellFit:
     if anew is None:
         return fit
     anew = anew if anew.solution.converged else fitter.further(anew)
-    return anew if fitter.misfit(anew) < fitter.misfit(fit) else fit
+    return anew if fitter.gains(anew, fit).sum() > 0.0 else fit
 
 
 def _one_by_one(fitter: CellFitter, fit: CellFit, tested: Sequence[Tested]) -> list[CellFit]:

@@ -8,10 +8,11 @@ from dataclasses import replace
 import pytest
 from test_evidence import NOMINAL, SCATTER, records
 
-from gap_diagnosis.kept_causes import SURE, _changing, _guesses, _one_by_one, kept
+from gap_diagnosis.kept_causes import SURE, _begun_anew, _changing, _guesses, _one_by_one, kept
 from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.outcome.diagnosis import Estimate
 from gap_diagnosis.tested_causes import causes_with_tests
+from gap_diagnosis.which import stepwise
 from gap_diagnosis.which.cell_fits import CellFitter
 from gap_diagnosis.which.found import Found
 from gap_diagnosis.which.gains import Gain
@@ -55,6 +56,35 @@ def test_steps_end_at_the_fit_itself(searched):
     assert [len(fit.effects) for fit in steps] == [1, 2, 3]
     assert steps[-1].model is fits[3].model
     assert all(set(a.effects) < set(b.effects) for a, b in itertools.pairwise(steps))
+
+
+def test_a_fit_that_has_lost_a_cause_is_begun_anew_where_that_does_better(searched):
+    fitter, fits = searched
+    proposals = fitter.screening(fits[0], "torque_bias").proposals()
+    alone = fitter.further(fitter.add(fits[0], "torque_bias", proposals))
+    astray = replace(alone, left=5.0 * alone.left)
+    anew = _begun_anew(fitter, astray, fits[0])
+    assert anew is not astray and anew.effects == ("torque_bias",)
+    assert fitter.gains(anew, astray).sum() > 0.0
+    assert anew.model.effects["torque_bias.torque_nm"] == pytest.approx(4.0, rel=0.2)
+    assert _begun_anew(fitter, fits[3], fits[0]) is fits[3]  # more than one cause from there
+
+
+@pytest.mark.parametrize(("misses", "more"), [(0.05, False), (0.5, True)])
+def test_what_promises_less_is_fitted_where_much_of_the_motion_is_missed(
+    searched, monkeypatch, misses, more
+):
+    monkeypatch.setattr(stepwise, "NOTHING_LEFT", 0.0)  # it goes on when both causes are found
+    fitter, fits = searched
+    tried: list[str] = []
+    effects = ["torque_bias", "delay", "quadratic_friction", "cogging", "position_friction",
+               "stribeck_friction_motor", "torque_saturation", "actuator_lag", "extra_mode",
+               "hysteresis"]  # fmt: skip
+    found = stepwise.Stepwise(fitter, effects, tried.append, misses=lambda _: misses).run(fits[0])
+    assert set(found.best.effects) == {"torque_bias", "delay"}
+    last = f"{' + '.join(found.best.effects)} + "
+    batches = [t for t in tried if t.startswith(last) and "(1 of " in t]
+    assert len(batches) == (2 if more else 1)
 
 
 def test_why_a_cause_that_closes_much_is_not_named_is_said(searched):
