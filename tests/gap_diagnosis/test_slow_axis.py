@@ -25,7 +25,8 @@ EFFECTS = {
     "delay.time_s": 1.0 / RATE,
     "load_friction.coefficient": 0.06,
 }
-LOOKED_FOR = ("gravity", "coulomb_friction", "viscous_friction", "torque_bias", "external_spring")
+LOOKED_FOR = ("gravity", "coulomb_friction", "viscous_friction", "load_friction", "torque_bias",
+              "external_spring")  # fmt: skip
 
 
 def moved(seed: int) -> RecordSet:
@@ -48,11 +49,18 @@ def moved(seed: int) -> RecordSet:
     return RecordSet("axis", RATE, tuple(runs))
 
 
-def test_gravity_is_named_beside_coulomb_friction():
+def test_gravity_and_all_friction_are_named_with_their_sizes():
     found = investigate_records(moved(30), datasheet({"jm": 2.2}, "axis"), effects=LOOKED_FOR)
     sizes = {n: v for cause in found.diagnosis.causes for n, v in cause.parameters.items()}
     named = {cause.effect: cause.present for cause in found.diagnosis.causes}
-    assert {"gravity", "coulomb_friction"} <= named.keys()
-    assert min(named["gravity"], named["coulomb_friction"]) > 0.7
-    assert sizes["gravity.torque_nm"].value == pytest.approx(GRAVITY, rel=0.05)
-    assert found.diagnosis.gap_closed > 0.95
+    assert set(named) == {"gravity", "coulomb_friction", "viscous_friction", "load_friction"}
+    assert min(named.values()) > 0.7
+    truth = {
+        "gravity.torque_nm": GRAVITY,
+        "coulomb_friction.motor_nm": COULOMB,
+        "viscous_friction.motor_nm_s_rad": AXIS["fvm"],
+        "load_friction.coefficient": EFFECTS["load_friction.coefficient"],
+    }
+    for name, value in truth.items():
+        assert sizes[name].value == pytest.approx(value, rel=0.05), name
+    assert found.diagnosis.gap_closed > 0.99
