@@ -41,8 +41,8 @@ help: ## show the targets
 demo: $(INSTALLED) ## install everything, run a campaign on the ROS graph, write its report
 	@$(BIN)/fjr demo
 
-test: $(INSTALLED) ## install everything, run the tests: 20 to 35 minutes on two cores
-	@echo "All tests: 20 to 35 minutes on two cores. make test-quick takes one or two."
+test: $(INSTALLED) ## install everything, run the tests: 15 to 30 minutes on two cores
+	@echo "All tests: 15 to 30 minutes on two cores. make test-quick takes one or two."
 	$(PYTEST) -n 2 --dist loadfile --no-loadscope-reorder
 
 test-quick: $(INSTALLED) ## run the tests of the cores that take least: one or two minutes

@@ -77,9 +77,8 @@ def test_what_promises_less_is_fitted_where_much_of_the_motion_is_missed(
     monkeypatch.setattr(stepwise, "NOTHING_LEFT", 0.0)  # it goes on when both causes are found
     fitter, fits = searched
     tried: list[str] = []
-    effects = ["torque_bias", "delay", "quadratic_friction", "cogging", "position_friction",
-               "stribeck_friction_motor", "torque_saturation", "actuator_lag", "extra_mode",
-               "hysteresis"]  # fmt: skip
+    effects = ["torque_bias", "delay", "quadratic_friction", "stribeck_friction_motor",
+               "torque_saturation", "dead_band", "torque_slew_limit"]  # fmt: skip
     found = stepwise.Stepwise(fitter, effects, tried.append, misses=lambda _: misses).run(fits[0])
     assert set(found.best.effects) == {"torque_bias", "delay"}
     last = f"{' + '.join(found.best.effects)} + "
