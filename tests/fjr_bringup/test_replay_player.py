@@ -101,12 +101,9 @@ def test_chosen_topics_from_an_offset_again_and_again_until_ctrl_c(start, mark, 
     assert replayed.interrupt() == 130
     assert "Interrupted: nothing is left of the replay." in replayed.output
     assert marked_processes(mark) == []
+    expected = DESCRIBED.stamps_ns[2500:].tolist()
     stamps = [stamp_ns(message) for message in reference]
-    assert set(stamps) <= set(DESCRIBED.stamps_ns[2500:].tolist())
-    # the clock paces here, not the reader: a busy machine may lose messages, but never their order
-    rounds = np.split(stamps, np.flatnonzero(np.diff(stamps) < 0) + 1)
-    assert len(rounds) >= 3
-    assert all((np.diff(one) > 0).all() for one in rounds)
+    assert stamps[:1000] == expected * 2 and stamps[1000:] == (expected * 99)[: len(stamps) - 1000]
     assert not ears.signals["y"] and not ears.signals["u"]
     cells = table(replayed.output)
     assert sorted(cells) == ["/clock", "/rig/experiment", "/rig/reference"]
