@@ -150,13 +150,13 @@ def investigate_records(
 
 
 def _searched(timing: Timing, names: Sequence[str], progress: Progress, until: float) -> Found:
-    misses = partial(_misses, timing.fitter)
+    misses = partial(_misses, timing.fitter, parts=timing.fitter.select_parts)
     return Stepwise(timing.fitter, names, progress, until, misses).run(timing.refit)
 
 
-def _misses(fitter: CellFitter, fit: CellFit) -> float:
-    """Return which share of the motion a fit misses on the parts that report, rms."""
-    return float(np.sqrt(np.mean(Ledger(fitter.evidence).squares(fit.model))))
+def _misses(fitter: CellFitter, fit: CellFit, parts: Sequence[int] | None = None) -> float:
+    """Return which share of the motion a fit misses on some parts, by default those that report."""
+    return float(np.sqrt(np.mean(Ledger(fitter.evidence, parts).squares(fit.model))))
 
 
 def _run_scatter(

@@ -39,11 +39,7 @@ def joint_state(stamp: int, **field: float) -> Any:
 
 
 class Rig:
-    """What a test hears of a run, as a recorder that paces it, and what it says itself.
-
-    Attributes:
-        paces: whether the run goes on while the test listens.
-    """
+    """What a test hears of a run, as a recorder that paces it, and what it says itself."""
 
     def __init__(self, peer: Peer) -> None:
         from builtin_interfaces.msg import Time
@@ -57,10 +53,9 @@ class Rig:
         self.link = peer.listen(JointState, "link_position", runtime.SIGNAL_QOS)
         self.clock = peer.listen(Clock, "/clock", runtime.CLOCK_QOS)
         recorded = peer.node.create_publisher(Time, "recorded", runtime.EXPERIMENT_QOS)
-        self.paces = True
 
         def pace() -> None:
-            if self.torque and self.paces:
+            if self.torque:
                 recorded.publish(self.torque[-1].header.stamp)
 
         peer.after_each_look = pace

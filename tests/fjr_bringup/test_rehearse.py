@@ -32,9 +32,9 @@ CALM = """
   ros__parameters: {rate_error: 1.0, jitter_p99_s: 10.0, latency_p99_s: 10.0, late_share: 1.0,
     lost: 1000000, delay_margin_share: .inf, bias_db: 100.0, bias_deg: 3600.0, response: .inf}
 /rig/controller:
-  ros__parameters: {p: 10.0, d: 1.0, position_timeout_s: 5.0, reference_timeout_s: 5.0}
+  ros__parameters: {p: 2.0, d: 0.1, position_timeout_s: 5.0, reference_timeout_s: 5.0}
 """
-"""Limits that a busy machine keeps, and a loop that a late torque does not make unstable."""
+"""Limits that a busy machine keeps, and a loop that no delay makes unstable."""
 
 
 @pytest.fixture
