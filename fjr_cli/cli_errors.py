@@ -58,6 +58,8 @@ def reports_errors(kept: str) -> Callable[[Command], Command]:
             except Exception as error:
                 if os.environ.get("FJR_DEBUG") == "1":
                     raise
+                if _interrupted(error):
+                    leave(f"Interrupted: {kept}.", INTERRUPTED)
                 leave(_out_of_memory(error) or _report(error), FAILURE)
 
         return reporting  # type: ignore[return-value]
@@ -101,13 +103,21 @@ def leave(sentence: str, status: int) -> NoReturn:
     raise typer.Exit(status) from None
 
 
+def _interrupted(error: Exception) -> bool:
+    """Tell whether an error is Ctrl-C, met by a library that was taking its locks just then.
+
+    The standard library's `with` on locks of several futures releases what it has not taken yet.
+    """
+    locks = isinstance(error, RuntimeError)
+    return locks and any(isinstance(each, KeyboardInterrupt) for each in _causes(error))
+
+
 def _out_of_memory(error: BaseException) -> str | None:
     """Return the sentence for an error that low memory has caused, else None.
 
     Whatever was under way, such as a compilation, wraps the error in its own words.
     """
-    cause: BaseException | None = error
-    while cause is not None:
+    for cause in _causes(error):
         low = isinstance(cause, OSError) and cause.errno == errno.ENOMEM
         low = low or any(words in str(cause) for words in _WITHOUT_MEMORY)
         if low or isinstance(cause, (MemoryError, BrokenExecutor)):
@@ -115,8 +125,15 @@ def _out_of_memory(error: BaseException) -> str | None:
                 "The memory is not enough, or a process of fjr was killed for it; free some, or "
                 "give fewer --workers, realizations or samples."
             )
-        cause = cause.__cause__ or cause.__context__
     return None
+
+
+def _causes(error: BaseException) -> Iterator[BaseException]:
+    """Yield an error and, one after the other, what it was raised from or while handling."""
+    cause: BaseException | None = error
+    while cause is not None:
+        yield cause
+        cause = cause.__cause__ or cause.__context__
 
 
 def _report(error: Exception) -> str:

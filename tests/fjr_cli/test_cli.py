@@ -216,6 +216,14 @@ def test_low_memory_is_one_sentence_whoever_met_it(error, monkeypatch):
     assert done.stderr.startswith("The memory is not enough, or a process of fjr was killed for it")
 
 
+def test_ctrl_c_that_a_lock_turns_into_its_own_error_is_an_interruption(monkeypatch):
+    monkeypatch.delenv("FJR_DEBUG", raising=False)
+    error = RuntimeError("release unlocked lock")
+    error.__context__ = KeyboardInterrupt()
+    done = CliRunner().invoke(failing(error))
+    assert done.exit_code == 130 and done.stderr == "Interrupted: finished bags are kept.\n"
+
+
 def test_too_low_a_limit_of_memory_is_told_before_anything_begins(tmp_path):
     """OpenBLAS would wait for ever for memory as it is loaded."""
     out = tmp_path / "bags"
