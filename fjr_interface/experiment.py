@@ -46,6 +46,11 @@ class _Description(BaseModel):
         """Whether the axis is linear: m, N and kg stand where rad, N m and kg m2 are said."""
         return (self.model_extra or {}).get("axis") == "linear"
 
+    @property
+    def integrated(self) -> bool:
+        """Whether the position is the integral of a recorded speed."""
+        return (self.model_extra or {}).get("position_from") == "speed"
+
     def to_json(self) -> str:
         """Return the JSON text, always the same for the same description."""
         return self.model_dump_json(by_alias=True)

@@ -6,6 +6,10 @@ stands still its own scatter shows it, and where a reference was played twice ha
 difference does, line by line, friction that scatters from run to run included. An encoder that
 counts in steps rounds, which is noise of a variance of step^2/12 whatever else is seen: one that
 stands still reads the same count for ever.
+
+A position that is the integral of a speed walks at random with the white noise of that speed, and
+its power falls off by two powers of frequency. Where the speed is itself the difference of encoder
+counts its noise rises with frequency, and its integral is the encoder's again.
 """
 
 from __future__ import annotations
@@ -27,6 +31,9 @@ from .records import Record, RecordSet
 NoiseSource = Literal["repeats", "standstill", "residual", "none"]
 
 _TOP = 0.75  # of the lines, above which only noise is expected
+_TRAPEZOID = 0.9  # of the lines, up to which the trapezoidal rule leaves noise to be seen
+_MIDDLE = 0.25, 0.5  # of the lines, with which those below _TRAPEZOID are compared
+_RISES = 2.0  # ratio of power above these from which noise is that of differences of encoder counts
 _FLAT = 2.0  # greatest ratio of power between the halves of these lines that counts as flat
 _ABOVE = 4.0  # times the power of noise, from which a line holds a signal
 _SEGMENTS, _LEAST_SEGMENT = 8, 256  # of a record, whose spectra are averaged; samples of one
@@ -47,20 +54,38 @@ class RecordNoise:
         std_rad: standard deviation of one sample of white noise, at least that of rounding; NaN if
             not known.
         step_rad: of the encoder; None where the positions show none.
+        walks: whether std_rad is that of what each sample adds to the noise of the one before.
     """
 
     source: NoiseSource
     std_rad: float
     step_rad: float | None = None
+    walks: bool = False
 
     @property
     def known(self) -> bool:
         """Whether any noise is known, so that something can be significant."""
         return self.source != "none"
 
+    def power(self, cycles: np.ndarray) -> np.ndarray:
+        """Return the variance of a line of an orthonormal transform (rad2), of the shape of cycles.
+
+        Args:
+            cycles: frequency of the line in cycles per sample, above 0.
+        """
+        white = np.full(cycles.shape, self.std_rad**2)
+        if not self.walks:
+            return white
+        seen = np.minimum(cycles, 0.5 * _TRAPEZOID)
+        return white / (2.0 * np.tan(np.pi * seen)) ** 2
+
 
 def record_noise(records: RecordSet) -> RecordNoise:
     """Return the noise of the position, by the best evidence that the records hold."""
+    if any(record.description.integrated for record in records.records):
+        walks = [w for w in (_walk(r.position) for r in records.records) if w is not None]
+        if walks:
+            return RecordNoise("residual", float(np.median(walks)), walks=True)
     step = position_step([r.position for r in records.records])
     rounding = 0.0 if step is None else step / math.sqrt(12.0)
     seen = _seen(records, rounding)
@@ -97,14 +122,14 @@ def stands_above_noise(records: RecordSet, frequency_hz: np.ndarray) -> np.ndarr
     for record in records.records:
         length = min(max(record.samples // _SEGMENTS, _LEAST_SEGMENT), record.samples)
         at, density = welch(record.position, rate, "blackmanharris", length, detrend="linear")
-        limit = _ABOVE * 2.0 * noise.std_rad**2 / rate
+        limit = _ABOVE * 2.0 * noise.power(np.maximum(at, 0.5 * at[1]) / rate) / rate
         held = np.flatnonzero(density > limit)
         if not held.size:
             continue
         low = at[held[0] + _LINE] if held[0] > _LINE else 0.0
         high = at[held[-1] - _LINE] if held[-1] < at.size - _LINE else at[-1]
         inside = (frequency_hz >= low) & (frequency_hz <= high)
-        above |= inside & (np.interp(frequency_hz, at, density) > limit)
+        above |= inside & (np.interp(frequency_hz, at, density - limit) > 0.0)
     return above
 
 
@@ -153,6 +178,23 @@ def _floor(signal: np.ndarray) -> float | None:
     return float(np.sqrt(0.5 * (lower + upper)))
 
 
+def _walk(signal: np.ndarray) -> float | None:
+    """Return what each sample of the trapezoidal integral of white noise adds; None if not seen."""
+    steps = np.diff(signal)
+    window = np.hanning(steps.size)
+    power = np.abs(np.fft.rfft((steps - steps.mean()) * window)) ** 2 / np.sum(window**2)
+    seen = power.size * np.array([*_MIDDLE, _TOP, 0.5 * (_TOP + _TRAPEZOID), _TRAPEZOID])
+    cycles = np.arange(power.size) / steps.size
+    white = power[: int(seen[-1])] / np.cos(np.pi * cycles[: int(seen[-1])]) ** 2
+    middle, _, lower, upper = (
+        float(np.median(part)) / np.log(2.0) if part.size else 0.0
+        for part in np.split(white, seen[:-1].astype(int))[1:]
+    )
+    if not lower > 0.0 or lower > _FLAT * upper or upper > _RISES * middle:
+        return None
+    return float(np.sqrt(0.5 * (lower + upper)))
+
+
 def _steps(difference: np.ndarray) -> float | None:
     """Return what second differences show of white noise; None if they show nothing."""
     second = np.diff(difference, 2)
@@ -186,16 +228,19 @@ def _detrended(piece: np.ndarray) -> float:
     return float(np.sqrt(np.sum(rest**2) / (piece.size - 3)))
 
 
-def band_lines(power: Sequence[float] | np.ndarray, noise_power: float, least: int = 8) -> int:
+def band_lines(
+    power: Sequence[float] | np.ndarray, noise_power: float | np.ndarray, least: int = 8
+) -> int:
     """Return how many lines from the lowest on hold a signal.
 
     Args:
         power: (lines,), mean power of each line over windows and records.
-        noise_power: of one line; NaN if not known.
+        noise_power: of one line, or of each; NaN if not known.
         least: fewest lines to return.
     """
     power = np.asarray(power)
-    floor = _ABOVE * noise_power if np.isfinite(noise_power) else 1e-12 * power.max(initial=0.0)
+    known = bool(np.isfinite(noise_power).all())
+    floor = _ABOVE * noise_power if known else 1e-12 * power.max(initial=0.0)
     smooth = np.convolve(power, np.ones(5) / 5.0, "same")
     above = np.flatnonzero(smooth > floor)
     last = int(above[-1]) + 1 if above.size else 0

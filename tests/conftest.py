@@ -19,6 +19,7 @@ from typing import Any
 import pytest
 from by_hand import Rig
 from hypothesis import HealthCheck, settings
+from nursery import Nursery
 from paths import ROOT
 from processes import MARK, Starter, marked_processes, wait_for
 from ros_domain import Peer, own_domain
@@ -112,10 +113,18 @@ def domain(mark: str, monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
         yield domain
 
 
+@pytest.fixture(scope="session")
+def nursery() -> Iterator[Nursery]:
+    """Give the tests the process from which their programs are forked."""
+    nursery = Nursery()
+    yield nursery
+    nursery.end()
+
+
 @pytest.fixture
-def start_program(mark: str, tmp_path: Path) -> Iterator[Starter]:
+def start_program(nursery: Nursery, mark: str, tmp_path: Path) -> Iterator[Starter]:
     """Give the test programs that it starts and ends."""
-    starter = Starter(tmp_path)
+    starter = Starter(nursery, tmp_path)
     yield starter
     starter.end()
 

@@ -12,8 +12,7 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any
 
-MARK = "FJR_TEST"
-"""Environment variable that tells the processes of a test from all others."""
+from nursery import MARK, Forked, Nursery
 
 IDLE_S = 90.0
 """How long a test waits for processes that neither compute nor wait for a processor."""
@@ -118,7 +117,7 @@ def wait_for(true: Callable[[], Any], what: str, pause_s: float = 0.02) -> Any:
     raise AssertionError(f"waited in vain for {what}")
 
 
-def exit_status(process: subprocess.Popen[Any]) -> int:
+def exit_status(process: subprocess.Popen[Any] | Forked) -> int:
     """Wait for the end of a process; return its status."""
     wait_for(lambda: process.poll() is not None, f"the end of {process.args}")
     return process.returncode
@@ -144,20 +143,21 @@ class Started:
     """A process of a test in a session of its own, with its output in a file."""
 
     def __init__(
-        self, folder: Path, *command: str, cwd: Path | None = None, errors_apart: bool = False
+        self,
+        nursery: Nursery,
+        folder: Path,
+        *command: str,
+        cwd: Path | None = None,
+        errors_apart: bool = False,
     ) -> None:
         number = len(list(folder.glob("*.out")))
         self._out = folder / f"{number}.out"
         self._errors = folder / f"{number}.errors"
-        with self._out.open("wb") as out, self._errors.open("wb") as errors:
-            self.process = subprocess.Popen(
-                [sys.executable, "-m", *command],
-                stdin=subprocess.DEVNULL,
-                stdout=out,
-                stderr=errors if errors_apart else subprocess.STDOUT,
-                cwd=cwd,
-                start_new_session=True,
-            )
+        self._out.touch()
+        self._errors.touch()
+        errors_to = self._errors if errors_apart else self._out
+        start = nursery.fork if nursery.fits() else _begin
+        self.process = start(*command, cwd=cwd, out=self._out, errors=errors_to)
 
     @property
     def output(self) -> str:
@@ -198,16 +198,28 @@ class Started:
         return self.exit_status()
 
 
+def _begin(*command: str, cwd: Path | None, out: Path, errors: Path) -> subprocess.Popen[bytes]:
+    with out.open("ab") as file, errors.open("ab") as other:
+        return subprocess.Popen(
+            [sys.executable, "-m", *command],
+            stdin=subprocess.DEVNULL,
+            stdout=file,
+            stderr=other,
+            cwd=cwd,
+            start_new_session=True,
+        )
+
+
 class Starter:
     """Starts programs as a person does, and ends what is left of them."""
 
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
+    def __init__(self, nursery: Nursery, folder: Path) -> None:
+        self._nursery, self._folder = nursery, folder
         self._started: list[Started] = []
 
     def __call__(self, module: str, *arguments: str, **options: Any) -> Started:
         """Run `python -m module arguments`."""
-        self._started.append(Started(self._folder, module, *arguments, **options))
+        self._started.append(Started(self._nursery, self._folder, module, *arguments, **options))
         return self._started[-1]
 
     def node(self, module: str, *, namespace: str | None = None, **parameters: Any) -> Started:

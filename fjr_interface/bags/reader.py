@@ -38,6 +38,11 @@ LINEAR_AXIS = (
     "The axis is linear: read m for rad, N for N m and kg for kg m2 wherever units are said."
 )
 
+SPEED = (
+    "The position is the integral of a recorded speed: it counts from where each run begins, which "
+    "is not known, and noise and offset of the speed let it drift."
+)
+
 MAX_LAG = 2**21
 _AUDIT_BLOCK = 2**16
 _RATE_SAMPLES = 1000
@@ -93,6 +98,8 @@ class BagReader:
         self.experiment = self._find_description()
         if self.experiment is not None and self.experiment.linear:
             self.notes += (LINEAR_AXIS,)
+        if self.experiment is not None and self.experiment.integrated:
+            self.notes += (SPEED,)
         if isinstance(self.experiment, RecordDescription) and "reference" in self._sources:
             self._sources["reference"] = replace(self._sources["reference"], required=False)
         found = {name: s.find(topics, self._bag) for name, s in self._sources.items()}

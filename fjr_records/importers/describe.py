@@ -58,6 +58,7 @@ def describe(
     periodic = all(isinstance(record.repetition, Repetition) for record in records)
     lines = _common_lines(records, notes) if periodic else None
     axis = {"axis": "linear"} if is_linear(columns) else {}
+    speed = {"position_from": "speed"} if columns["position"].is_speed else {}
     for level in range(levels):
         part = slice(level * each_level, (level + 1) * each_level)
         inside = records[part]
@@ -74,6 +75,7 @@ def describe(
                 "controller": controllers[part][number],
                 "imported": _source(record, columns),
                 **axis,
+                **speed,
             }
             source = str(record.path)
             if lines is None:

@@ -12,18 +12,22 @@ _ANGLE = {"rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "deg": math.pi / 180.0, "rev":
 _TORQUE = {"N m": 1.0, "Nm": 1.0, "mN m": 1e-3, "mNm": 1e-3, "kN m": 1e3, "kNm": 1e3}
 _LENGTH = {"m": 1.0, "mm": 1e-3, "um": 1e-6}
 _FORCE = {"N": 1.0, "kN": 1e3}
+_TURNING = {"rad/s": 1.0, "deg/s": math.pi / 180.0, "rpm": math.pi / 30.0, "rev/s": 2.0 * math.pi}
+_SLIDING = {"m/s": 1.0, "mm/s": 1e-3}
 _TIME = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 UNITS: Mapping[str, Mapping[str, float]] = {
-    "reference": _ANGLE | _LENGTH,
+    "reference": _ANGLE | _LENGTH | _TURNING | _SLIDING,
     "torque": _TORQUE | _FORCE,
-    "position": _ANGLE | _LENGTH,
-    "link": _ANGLE | _LENGTH,
+    "position": _ANGLE | _LENGTH | _TURNING | _SLIDING,
+    "link": _ANGLE | _LENGTH | _TURNING | _SLIDING,
     "time": _TIME,
 }
 """Units of each quantity with their factors to rad, N m and s, or to m and N of a linear axis; the
 first is the default."""
-LINEAR = frozenset({*_LENGTH, *_FORCE})
+LINEAR = frozenset({*_LENGTH, *_FORCE, *_SLIDING})
 """Units of a linear axis."""
+SPEEDS = frozenset({*_TURNING, *_SLIDING})
+"""Units of a speed, whose integral is the angle."""
 GREATEST_FACTOR = 1e12
 """A factor to SI lies between this and its inverse."""
 REQUIRED = ("torque", "position")
@@ -45,6 +49,11 @@ class Column:
     factor: float = 1.0
     by_factor: bool = False
     unit: str = ""
+
+    @property
+    def is_speed(self) -> bool:
+        """Whether it holds the speed of what it stands for."""
+        return self.unit in SPEEDS
 
     @classmethod
     def parse(cls, quantity: str, text: str) -> Column:

@@ -15,7 +15,8 @@ from ..units import may_stick
 from . import coherence
 from .columns import read_columns
 from .import_map import Column
-from .repetition import Repetition, find_repetition
+from .integrals import DRIFTS, integrals
+from .repetition import Repetition, find_repetition, insists
 from .stamps import LONGEST_S, Timing, read_timing, resample
 from .wraps import without_wraps
 
@@ -114,7 +115,9 @@ def read_samples(path: Path, options: ImportOptions) -> Samples:
         for quantity in unsigned
     )
     values = {q: column.factor * arrays[column.name] for q, column in columns.items()}
+    speeds = {q: values.pop(q) for q, column in columns.items() if column.is_speed}
     values, turns = without_wraps(values)
+    values |= speeds
     notes += turns
     size = values["position"].size
     if options.repeat_reference and 0 < values.get("reference", np.empty(0)).size <= size:
@@ -165,10 +168,16 @@ def understand(samples: Samples, rate_hz: float, options: ImportOptions) -> Reco
     if timing.stamps_s is not None:
         values, errors = resample(path, timing, values, rate_hz)
         notes += errors
+    values, integrated = integrals(values, options.columns, rate_hz)
+    notes += integrated
     signals = {SYMBOLS[quantity]: each for quantity, each in values.items()}
     if not np.ptp(signals["y"]) > 0:
         raise InputError(f"{path}: the position is constant; map the column that carries it.")
-    found = find_repetition(str(path), signals, rate_hz, options)
+    found: Repetition | str = DRIFTS
+    if not options.columns["position"].is_speed:
+        found = find_repetition(str(path), signals, rate_hz, options)
+    elif insists(options):
+        raise InputError(f"{path}: {DRIFTS}; leave out what is said of its periods and lines.")
     repetition = found if isinstance(found, Repetition) else None
     doubts = _unit_doubts(path, signals, repetition, options.columns)
     if not np.ptp(signals["u"]) > 0:

@@ -76,6 +76,16 @@ class Repetition:
         return self.samples_per_period * (self.transient_periods + self.periods)
 
 
+def insists(asked: Asked) -> bool:
+    """Tell whether the user said that the run repeats."""
+    return (
+        asked.samples_per_period is not None
+        or asked.excited_harmonics is not None
+        or asked.periods is not None
+        or asked.transient_periods > 1
+    )
+
+
 def find_repetition(
     name: str, signals: Mapping[str, np.ndarray], rate_hz: float, asked: Asked
 ) -> Repetition | str:
@@ -95,19 +105,13 @@ def find_repetition(
     """
     if "r" not in signals:
         return "no reference was recorded"
-    insisted = (
-        asked.samples_per_period is not None
-        or asked.excited_harmonics is not None
-        or asked.periods is not None
-        or asked.transient_periods > 1
-    )
     try:
         found = _find(name, signals["r"], rate_hz, asked)
         why = _unrepeated(found, signals)
         if why is not None:
             raise InputError(f"{name}: {why}")
     except InputError as error:
-        if insisted:
+        if insists(asked):
             raise
         return str(error).removeprefix(f"{name}: ").partition("; ")[0].rstrip(".")
     return found

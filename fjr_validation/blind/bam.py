@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gap_diagnosis.model.evidence import Purpose
+from gap_diagnosis.model.parts import Purpose
 from gap_diagnosis.outcome.diagnosis import Diagnosis
 
 from .bam_plant import play

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gap_diagnosis.model.evidence import Purpose
+from gap_diagnosis.model.parts import Purpose
 from gap_diagnosis.outcome.diagnosis import Diagnosis, Gap, Stage
 
 from .baseline_fit import MATTERS, Problem, verdict_of

@@ -84,7 +84,7 @@ def compare_records(
 
 def _yardstick(evidence: Evidence, parts: tuple[int, ...]) -> np.ndarray:
     if evidence.noise.known:
-        return np.full(evidence.cells, evidence.noise.std_rad**2)
+        return evidence.noise_power
     return evidence.mean_squares(evidence.measured(parts), parts)
 
 

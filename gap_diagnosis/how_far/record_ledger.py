@@ -73,7 +73,7 @@ class Ledger:
         evidence = self.evidence
         if not evidence.noise.known:
             return None
-        each = evidence.noise.std_rad**2 / self._scale
+        each = evidence.noise_power[evidence.cell_of(self.parts)] / self._scale
         windows = sum(evidence.windows(p) for p in self.parts)
         return Gap(
             nrmse_position=float(np.sqrt(np.sum(each) / windows)),

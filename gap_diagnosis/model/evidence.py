@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
@@ -19,46 +18,21 @@ import numpy as np
 from fjr_records.record_noise import RecordNoise, band_lines, record_noise
 from fjr_records.records import RecordSet
 
-from .lapped import lapped, windows_in
+from .lapped import lapped
+from .parts import Purpose, cut
 from .quasi_static import QuasiStaticSimulator, Stations
 from .record_rig import RecordSimulator
 from .simulated_rig import Model
-
-Purpose = Literal["fit", "select", "report"]
 
 WINDOWS = 24
 """Windows into which the shortest record is cut, at least; twice as many where a level has a single
 record, since that serves all purposes, and a test of few blocks shows nothing."""
 _LONGEST_WINDOW_S = 4.0
-_WINDOWS_PER_BLOCK = 2
 _LONG = 160  # samples: longer hops are multiples of 16, which transforms fast
-_PURPOSES: tuple[Purpose, ...] = ("fit", "select", "report")
-_CYCLE: tuple[Purpose, ...] = ("fit", "select", "fit", "report")
-"""Purposes of the blocks of a level's only record, shifted from level to level: what one time of
-the record shows serves all purposes."""
 _SLOW_WINDOWS = 96
 _SLIGHT = 0.01  # of the torque: in a slow motion, less of it says nothing
 _SIMULATION = 1e-3  # error of the simulation itself, of its torque or of its motion
 _DIVERGED = 1e6
-
-
-@dataclass(frozen=True)
-class Part:
-    """Some windows of one record.
-
-    Attributes:
-        record: its index.
-        level: index of its level.
-        windows: which windows.
-        purpose: what it is for.
-        stretch: of the record, in time; what is left on parts of one stretch is alike.
-    """
-
-    record: int
-    level: int
-    windows: slice
-    purpose: Purpose
-    stretch: int
 
 
 class Evidence:
@@ -104,8 +78,7 @@ class Evidence:
             self.simulator = QuasiStaticSimulator(slow)
         else:
             self.noise = record_noise(records)
-            power = np.mean(np.concatenate(self._measured) ** 2, axis=0)
-            self.lines = band_lines(power, self.noise.std_rad**2)
+            self.lines = self._lines_with_signal()
             top_hz = self.lines * self.line_hz
             self.simulator = RecordSimulator(records, self.noise, top_hz, nominal)
         self.edges = _edges(self.lines)
@@ -115,8 +88,23 @@ class Evidence:
             / np.maximum(np.abs(self.simulator.response(frequency, i)), 1e-300)
             for i, r in enumerate(records.records)
         ]
-        self.parts = tuple(_parts(records, self.hop))
+        self.parts = tuple(cut(records, self.hop))
         self._band = np.searchsorted(self.edges, np.arange(self.lines), side="right") - 1
+
+    def _lines_with_signal(self) -> int:
+        """Return how many lines from line 0 on hold more than noise.
+
+        Noise that walks lies below what windows let through to the highest lines of a motion of
+        many turns, so they are looked for in the differences of the samples. White noise lies above
+        most of that, and an observer that crosses over as high as the rest says holds better.
+        """
+        cycles = 0.5 * (np.arange(self.hop) + 0.5) / self.hop
+        if not self.noise.walks:
+            power = np.mean(np.concatenate(self._measured) ** 2, axis=0)
+            return band_lines(power, self.noise.power(cycles))
+        steps = [lapped(np.diff(r.position), self.hop) for r in self.records.records]
+        power = np.mean(np.concatenate(steps) ** 2, axis=0)
+        return band_lines(power / (2.0 * np.sin(np.pi * cycles)) ** 2, self.noise.power(cycles))
 
     @property
     def line_hz(self) -> float:
@@ -132,6 +120,15 @@ class Evidence:
     def cells(self) -> int:
         """Number of cells."""
         return len(self.records.levels) * self.bands
+
+    @cached_property
+    def noise_power(self) -> np.ndarray:
+        """Variance of the noise of an error in each cell, (cells,), rad2; 0 where not known."""
+        if not self.noise.known:
+            return np.zeros(self.cells)
+        cycles = 0.5 * (np.arange(self.lines) + 0.5) / self.hop
+        of_band = np.add.reduceat(self.noise.power(cycles), self.edges[:-1]) / np.diff(self.edges)
+        return np.tile(of_band, len(self.records.levels))
 
     @property
     def player(self) -> RecordSimulator:
@@ -240,7 +237,6 @@ class Evidence:
         this torque would make against the controller alone: much less than of the motion itself
         where a stiff loop moves far and slowly.
         """
-        noise = self.noise.std_rad**2 if self.noise.known else 0.0
         if self.slow:
             every = np.concatenate([np.ravel(lines) for lines in self._held])
             return np.full(self.cells, _SLIGHT**2 * np.mean(every**2) + 1e-30)
@@ -248,7 +244,7 @@ class Evidence:
             self.mean_squares(self._on_parts(lines, which), which)
             for lines in (self._measured, self._held)
         )
-        return noise + _SIMULATION**2 * np.minimum(moved, held) + 1e-30
+        return self.noise_power + _SIMULATION**2 * np.minimum(moved, held) + 1e-30
 
     def mean_squares(self, values: np.ndarray, which: Sequence[int]) -> np.ndarray:
         """Return the mean square of numbers on parts in each cell, (cells,); 0 where none is."""
@@ -264,33 +260,3 @@ def _edges(lines: int) -> np.ndarray:
     while edges[-1] < lines:
         edges.append(min(edges[-1] + max(edges[-1], 4), lines))
     return np.array(edges)
-
-
-def _parts(records: RecordSet, hop: int) -> list[Part]:
-    """Cut records into parts, and give each a purpose.
-
-    Levels of three records or more have whole records for each purpose; of two, the second one
-    selects and reports, block by block; a single one serves all three.
-    """
-    parts = []
-    for number, level in enumerate(records.levels):
-        members = [i for i, r in enumerate(records.records) if r.level == level]
-        members.sort(key=lambda i: -float(np.abs(records.records[i].torque).max()))
-        for place, index in enumerate(members):
-            count = windows_in(records.records[index].samples, hop)
-            blocks = max(count // _WINDOWS_PER_BLOCK, 1)
-            ends = np.linspace(0, count, blocks + 1).astype(int)
-            for block in range(blocks):
-                purpose = _purpose(len(members), place, block + number)
-                windows = slice(int(ends[block]), int(ends[block + 1]))
-                stretch = block // len(_CYCLE) if len(members) == 1 else block
-                parts.append(Part(index, level, windows, purpose, stretch))
-    return parts
-
-
-def _purpose(records: int, place: int, block: int) -> Purpose:
-    if records >= 3:
-        return _PURPOSES[place % 3]
-    if records == 2:
-        return "fit" if place == 0 else _PURPOSES[1 + block % 2]
-    return _CYCLE[block % 4]

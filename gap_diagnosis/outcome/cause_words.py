@@ -12,7 +12,7 @@ from .verdict_words import explanation
 NOISE: dict[str, str] = {
     "repeats": "The noise is known from what repeats.",
     "standstill": "The noise is known from a standstill of the axis.",
-    "residual": "The noise is known from the highest frequencies, where the position is flat.",
+    "residual": "The noise is known from the highest frequencies, where nothing else is left.",
     "none": "The noise is not known, so nothing is said of significance.",
 }
 REPORTED: dict[str, str] = {

@@ -42,7 +42,7 @@ class CellWeights:
         runs = [r.level for r in evidence.records.records]
         self._alone = np.array([runs.count(level) == 1 for level in levels])
         self._coherent = np.full((len(levels), evidence.bands), LEAST_INDEPENDENT)
-        self._noise = evidence.noise.std_rad**2 if evidence.noise.known else 0.0
+        self._noise = evidence.noise_power
         self._floor = evidence.floor(self.fit_parts)
         of_part = np.array([part.record for part in evidence.parts])
         self.runs = of_part[evidence.part_of(self.fit_parts)]
@@ -107,7 +107,8 @@ class CellWeights:
             after: (parts, bands), mean squares that one fit leaves there, rad2.
             before: those of the other fit.
         """
-        noise = np.minimum(self._noise / np.minimum(before, after), 1.0)
+        known = self._noise[: self._evidence.bands]
+        noise = np.minimum(known / np.minimum(before, after), 1.0)
         coherent = np.minimum(self._coherent[self._select_levels], self.counts)
         numbers = independent(noise, self.counts, coherent)
         return 0.5 * numbers * np.log(before / after)

@@ -1,0 +1,69 @@
+"""Records cut into parts: blocks of windows, for fitting, for selecting or for reporting."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from fjr_records.records import RecordSet
+
+from .lapped import windows_in
+
+Purpose = Literal["fit", "select", "report"]
+
+_WINDOWS_PER_BLOCK = 2
+_PURPOSES: tuple[Purpose, ...] = ("fit", "select", "report")
+_CYCLE: tuple[Purpose, ...] = ("fit", "select", "fit", "report")
+"""Purposes of the blocks of a level's only record, shifted from level to level: what one time of
+the record shows serves all purposes."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """Some windows of one record.
+
+    Attributes:
+        record: its index.
+        level: index of its level.
+        windows: which windows.
+        purpose: what it is for.
+        stretch: of the record, in time; what is left on parts of one stretch is alike.
+    """
+
+    record: int
+    level: int
+    windows: slice
+    purpose: Purpose
+    stretch: int
+
+
+def cut(records: RecordSet, hop: int) -> list[Part]:
+    """Cut records into parts, and give each a purpose.
+
+    Levels of three records or more have whole records for each purpose; of two, the second one
+    selects and reports, block by block; a single one serves all three.
+    """
+    parts = []
+    for number, level in enumerate(records.levels):
+        members = [i for i, r in enumerate(records.records) if r.level == level]
+        members.sort(key=lambda i: -float(np.abs(records.records[i].torque).max()))
+        for place, index in enumerate(members):
+            count = windows_in(records.records[index].samples, hop)
+            blocks = max(count // _WINDOWS_PER_BLOCK, 1)
+            ends = np.linspace(0, count, blocks + 1).astype(int)
+            for block in range(blocks):
+                purpose = _purpose(len(members), place, block + number)
+                windows = slice(int(ends[block]), int(ends[block + 1]))
+                stretch = block // len(_CYCLE) if len(members) == 1 else block
+                parts.append(Part(index, level, windows, purpose, stretch))
+    return parts
+
+
+def _purpose(records: int, place: int, block: int) -> Purpose:
+    if records >= 3:
+        return _PURPOSES[place % 3]
+    if records == 2:
+        return "fit" if place == 0 else _PURPOSES[1 + block % 2]
+    return _CYCLE[block % 4]
