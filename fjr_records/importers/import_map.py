@@ -85,6 +85,11 @@ def parse_map(specs: Sequence[str]) -> dict[str, Column]:
     columns: dict[str, Column] = {}
     for spec in specs:
         quantity, equals, source = spec.strip().partition("=")
+        if quantity in ("speed", "velocity") and equals:
+            raise InputError(
+                f"the map {spec!r} is not understood: a speed stands for an angle, as in "
+                "position=v:rpm or reference=v:rad/s."
+            )
         if not equals or quantity not in UNITS or quantity in columns:
             raise InputError(
                 f"the map {spec!r} is not understood; give each of {', '.join(UNITS)} at most "

@@ -249,10 +249,11 @@ def test_harmonics_text():
         (("reference=r", "position=y"), "lacks torque; add torque=column"),
         ((), "lacks torque and position"),
         ((*SI_MAP, "torque=u"), "'torque=u' is not understood; give each of .* at most once"),
-        ((*SI_MAP, "speed=v"), "'speed=v' is not understood"),
+        ((*SI_MAP, "gain=v"), "'gain=v' is not understood"),
+        (("torque=u", "velocity=v:rpm"), "a speed stands for an angle, as in position=v:rpm"),
         ((*SI_MAP, "q"), "'q' is not understood"),
         (
-            ("reference=r", "torque=u", "position=y:rpm"),
+            ("reference=r", "torque=u", "position=y:grad"),
             "one of the units rad, mrad, .*, or with a f",
         ),
         (("reference=r", "torque=u:rad", "position=y"), "one of the units N m, "),
