@@ -144,10 +144,7 @@ def _serve(connection: Connection) -> Any:
         if verb == "poll":
             pid, status = os.waitpid(what, os.WNOHANG)
             connection.send(os.waitstatus_to_exitcode(status) if pid else None)
-        elif pid := os.fork():
-            connection.send(pid)
-        else:
-            connection.close()
+        elif not os.fork():
             return what
 
 
@@ -178,6 +175,11 @@ def _show(mark: str) -> None:
 
 if __name__ == "__main__":
     _load()
-    if program := _serve(Connection(int(sys.argv[1]))):
-        _become(*program)
+    with Connection(int(sys.argv[1])) as tests:
+        if program := _serve(tests):
+            try:
+                _become(*program)
+            finally:
+                tests.send(os.getpid())
+    if program:
         runpy.run_module(program[0], run_name="__main__", alter_sys=True)

@@ -20,7 +20,7 @@ from by_hand import (
     stamp_ns,
 )
 from graph_runs import campaign, contents, in_batch, in_graph
-from processes import node_pid, wait_for
+from processes import wait_for
 
 from fjr_bringup.campaign.progress import CampaignProgress
 from fjr_bringup.graph import conductor
@@ -136,19 +136,15 @@ def test_in_real_time_every_sample_is_played_and_the_drive_says_how_late(start, 
     assert "pause" in fjr(start, "pause", status=2)
 
 
-def test_without_positions_the_controller_takes_the_torque_down_and_so_does_its_end(
-    start,
-    rig,
-    mark,
-):
+def test_without_positions_the_controller_takes_the_torque_down_and_so_does_its_end(start, rig):
     nodes = in_real_time(start, periods=500)
     simulator, controller = nodes["s"](), nodes["c"]()
     nodes["e"]()
     rig.peer.spin_until(lambda: len(rig.torque) > 200, "torques")
-    os.kill(node_pid(mark, "fjr_sim_node"), signal.SIGSTOP)
+    os.kill(simulator.process.pid, signal.SIGSTOP)
     controller.wait_for_text("Tripped: no position for 0.1 s")
     rig.peer.spin_until(lambda: rig.torque[-1].effort[0] == 0.0, "zero torque")
-    os.kill(node_pid(mark, "fjr_sim_node"), signal.SIGCONT)
+    os.kill(simulator.process.pid, signal.SIGCONT)
     said = len(rig.torque)
     rig.peer.spin_until(lambda: len(rig.torque) > said + 100, "torques of the drive that is back")
     assert not any(message.effort[0] for message in rig.torque[said:])
