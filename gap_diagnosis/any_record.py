@@ -18,7 +18,7 @@ from fjr_records.experiment_folder import Override
 from fjr_records.periodic import RecordedExperiment, read_experiment
 from fjr_records.records import RecordSet, read_records, reference_optional
 
-from . import second_look
+from . import further_looks
 from .drift_gate import drift_gate
 from .gates.gate_checks import DISCRETISATION_LIMIT
 from .investigation import Investigation, investigate
@@ -34,7 +34,6 @@ from .which.search_space import TOLERANCE
 
 Progress = Callable[[str], None]
 
-_LEAST_LEFT = 0.5  # of the budget that a first look may take if there is to be a second one
 STEADY_SHARE = 0.5
 """Of the budget for explanations of steady periods that leave noise alone."""
 BESIDE = (
@@ -145,8 +144,8 @@ def investigate_any(
     remainder; so are those of periods that do not repeat, whose verdict stays where nothing is
     found. An effect that steady periods would name is looked for in whole runs, too, where no run
     was held out: nothing is named that nothing has tested. Records of which nothing is named are
-    compared by torque alone where they are slow enough for that. Where the datasheet itself stands
-    in the way, a second look takes it for further off.
+    compared by torque alone where they are slow enough for that. Where fits end as far from the
+    datasheet as they may go, further looks take it for further off, and for right.
     """
     begun = time.monotonic()
 
@@ -154,17 +153,22 @@ def investigate_any(
         return _look(recorded, nominal, tolerance, effects, budget_s, progress)
 
     found = look(tolerance, budget_s)
+    if not further_looks.are_called_for(found):
+        return found
     took = time.monotonic() - begun
-    if not second_look.is_called_for(found) or took > _LEAST_LEFT * budget_s:
-        return found
-    progress("once more, for a datasheet that is further off")
-    second = look(second_look.WIDER * tolerance, budget_s - took)
     bare = Model.nominal(nominal).plant
-    if not second_look.says_more(second.diagnosis, found.diagnosis, bare):
-        return found
-    said = second_look.said(second.diagnosis, bare, tolerance)
-    told = second.diagnosis.model_copy(update={"notes": [said, *second.diagnosis.notes]})
-    return replace(second, diagnosis=told)
+    for times, supposed in further_looks.TIMES.items():
+        left = begun + budget_s - time.monotonic()
+        if left < took:  # another look takes about as long
+            break
+        progress(f"once more, for a datasheet that {supposed}")
+        other = look(times * tolerance, left)
+        if further_looks.says_more(other.diagnosis, found.diagnosis, bare):
+            said = further_looks.said(other.diagnosis, bare, tolerance, times)
+            notes = [said, *other.diagnosis.notes]
+            found = replace(other, diagnosis=other.diagnosis.model_copy(update={"notes": notes}))
+            break
+    return found
 
 
 def _look(

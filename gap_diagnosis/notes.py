@@ -19,7 +19,6 @@ NOT_HELD_OUT = (
     "itself, no prediction was tested, and the confidence is at most "
     f"{UNTESTED:.0%}; record two or more realizations of each level."
 )
-_AT_LIMIT = 0.01  # of the way from the datasheet to the bound
 
 
 def notes(
@@ -123,10 +122,8 @@ def at_limits(space: Space, x: np.ndarray, plant: Mapping[str, float]) -> list[s
         x: where it ended.
         plant: the base parameters there.
     """
-    low, high = space.bounds()
     told = []
-    for k, (name, stated) in enumerate(space.nominal.items()):
-        ended = low[k] < high[k] and min(x[k] - low[k], high[k] - x[k]) < _AT_LIMIT * high[k]
+    for (name, stated), ended in zip(space.nominal.items(), space.at_limits(x), strict=True):
         if name in ("jm", "j", "k0") and ended:
             off = 100.0 * (plant[name] / stated - 1.0)
             told.append(f"{name} {abs(off):.0f} % {'above' if off > 0.0 else 'below'}")

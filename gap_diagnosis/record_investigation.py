@@ -129,9 +129,9 @@ def investigate_records(
     if _misses(timing.fitter, timing.refit) > _HOPELESS:
         names = []
     found = _searched(timing, names, progress, until)
-    if timing.held is not None and timing.better_held(found.best):
-        timing = timing.held
-        progress("search with a torque that is held")
+    if (other := timing.other_if_better(found.best)) is not None:
+        timing = other
+        progress(f"search with a torque that is {'' if timing.held else 'not '}held")
         found = _searched(timing, names, progress, until)
     fitter, evidence, heard = timing.fitter, timing.fitter.evidence, [*timing.notes]
     progress("scatter from run to run")

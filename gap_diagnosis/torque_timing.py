@@ -7,7 +7,7 @@ are missing, a delay does in part what they would, and half a sample of it may d
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from fjr_records.records import RecordSet
 
@@ -32,24 +32,37 @@ class Timing:
         fitter: of the records, their torque being held or a signal.
         refit: fit of the base parameters alone.
         notes: sentences on it.
-        held: the same with a torque that is held; None where it is, or a loop makes it.
+        held: whether the torque is held from sample to sample.
+        other: the same with a torque that acts in the other way; None where a loop makes it, or
+            that is out of the question.
     """
 
     fitter: CellFitter
     refit: CellFit
     notes: tuple[str, ...] = ()
-    held: Timing | None = None
+    held: bool = True
+    other: Timing | None = None
 
-    def better_held(self, best: CellFit) -> bool:
-        """Tell whether what was found is a delay of half a sample, of a torque that is held."""
+    def other_if_better(self, best: CellFit) -> Timing | None:
+        """Return the other way, if what was found speaks for it.
+
+        A signal that was found to come half a sample late is one that is held; a torque that was
+        held while causes were missing may do clearly better as a signal beside them.
+        """
+        other = self.other
+        if other is None:
+            return None
+        if self.held:
+            as_signal = other.fitter.taken_over(best)
+            return other if gain(self.fitter, as_signal, best).present else None
         rate = self.fitter.evidence.records.sample_rate_hz
         late = [e for e in best.effects if e in _LATE and _half(best.model, e, rate)]
-        if self.held is None or not late:
-            return False
+        if not late:
+            return None
         (effect,) = late[:1]
         worth = gain(self.fitter, best, self.fitter.without(best, effect)).mean
-        held = self.held.fitter.without(best, effect)
-        return stands_for(gain(self.fitter, best, held), worth)
+        held = other.fitter.without(best, effect)
+        return other if stands_for(gain(self.fitter, best, held), worth) else None
 
 
 def _half(model: Model, effect: str, rate: float) -> bool:
@@ -79,9 +92,10 @@ def timed(
     late = _late(other, again)
     if "delay" in late.effects and _half(late.model, "delay", records.sample_rate_hz):
         return held
+    signal = Timing(other, again, (CONTINUOUS,), held=False)
     if gain(fitter, late, _late(fitter, refit)).present:
-        return Timing(other, again, (CONTINUOUS,), held)
-    return held
+        return replace(signal, other=held)
+    return replace(held, other=signal)
 
 
 def _late(fitter: CellFitter, refit: CellFit) -> CellFit:

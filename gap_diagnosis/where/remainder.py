@@ -64,6 +64,16 @@ def looks_like(records: Sequence[Record], missing: Sequence[np.ndarray], smooth:
     return [f"{name}: {shares[name]:.0%}" for name in ordered if shares[name] >= LEAST_SHARE]
 
 
+def share_of_velocity(
+    records: Sequence[Record], missing: Sequence[np.ndarray], smooth: int
+) -> float:
+    """Return the share of the missing torque that a function of velocity explains, see above."""
+    torque = np.concatenate([uniform_filter1d(m, smooth) for m in missing])
+    velocity = np.concatenate([_rate(uniform_filter1d(r.position, smooth)) for r in records])
+    total = float(np.mean(torque**2))
+    return _explained(velocity, torque - torque.mean()) / total if total > 0.0 else 0.0
+
+
 def _rate(signal: np.ndarray) -> np.ndarray:
     return np.gradient(signal)
 

@@ -98,9 +98,7 @@ class CellFitter:
     def refit(self) -> CellFit:
         """Fit the base parameters alone, from the datasheet."""
         space = Space(self.nominal, (), (), self.tolerance, self.scales)
-        start = space.point(Model(self.nominal, {}))
-        errors = self.evidence.errors([space.model(start)], self.fit_parts)[0]
-        first = self._reweighted((), space, start, self.weights.variance(errors), _REFIT_ROUNDS)
+        first = self._begun((), space, space.point(Model(self.nominal, {})))
         left = first.solution.residuals / self.weights.weight(first.variance)
         return self.further(first) if self.weights.learn(left) else first
 
@@ -197,6 +195,10 @@ class CellFitter:
         )
         return replace(ended, acts=fit.acts)
 
+    def taken_over(self, fit: CellFit) -> CellFit:
+        """Return what the fit of another fitter comes to here, from where it ended there."""
+        return self._begun(fit.effects, fit.space, fit.solution.x)
+
     def acted(self, fit: CellFit, effect: str) -> np.ndarray:
         """Return whether an effect moves each part that selects, beside what the fit leaves there.
 
@@ -223,10 +225,8 @@ class CellFitter:
             u for n, u in zip(fit.space.effects, fit.space.units, strict=True) if n in names
         )
         space = replace(fit.space, effects=names, units=units)
-        start = space.point(fit.model)
         rest = tuple(e for e in fit.effects if e != effect)
-        errors = self.evidence.errors([space.model(start)], self.fit_parts)[0]
-        return self._reweighted(rest, space, start, self.weights.variance(errors), _REFIT_ROUNDS)
+        return self._begun(rest, space, space.point(fit.model))
 
     def misfit(self, fit: CellFit) -> float:
         """Return what a fit leaves on unseen parts over noise and the simulation's own error.
@@ -274,6 +274,11 @@ class CellFitter:
 
     def _residuals(self, variance: np.ndarray, models: Sequence[Model]) -> np.ndarray:
         return self.evidence.errors(models, self.fit_parts) * self.weights.weight(variance)
+
+    def _begun(self, effects: tuple[str, ...], space: Space, start: np.ndarray) -> CellFit:
+        """Return a fit whose weights begin with what its start leaves."""
+        errors = self.evidence.errors([space.model(start)], self.fit_parts)[0]
+        return self._reweighted(effects, space, start, self.weights.variance(errors), _REFIT_ROUNDS)
 
     def _reweighted(
         self,

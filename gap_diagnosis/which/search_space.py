@@ -21,13 +21,20 @@ TOLERANCE = 0.1
 """How far a datasheet value may be off; fits look further, since a torque constant that is off
 scales all values, and an encoder whose gain is off (an eccentric one, locally) once more."""
 
+_SCALE = 2.0
 _SCALES = {"k1": 3.0}
 """How many factors of 1 + 3 TOLERANCE fits look away from a nominal value, where not two: k1 goes
 with the cube of the position."""
 
+_AT_LIMIT = 0.01  # of the way from the nominal to the bound
 _LEAST_LINK = 0.4  # of its inertia that a third mass leaves it at a start
 
 _COARSE_CYCLES = 11
+
+
+def farthest(tolerance: float, scale: float = _SCALE) -> float:
+    """Return how far above a nominal value a fit may go, relative to it, for its tolerance."""
+    return float((1.0 + 3.0 * tolerance) ** scale - 1.0)
 
 
 def possible_effects(nominal: Mapping[str, float]) -> list[str]:
@@ -166,10 +173,19 @@ class Space:
         ]
         return np.array(base + values)
 
+    def at_limits(self, x: np.ndarray) -> np.ndarray:
+        """Return which base parameters are as far from the nominal as they may go, bool (base,)."""
+        base = slice(len(self.nominal))
+        low, high = (bound[base] for bound in self.bounds())
+        left = np.minimum(x[base] - low, high - x[base])
+        return np.asarray((low < high) & (left < _AT_LIMIT * high))
+
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Return lower and upper bounds of a point."""
-        scale = np.log1p(3.0 * self.tolerance)
-        far = [_SCALES.get(n, 2.0) * scale if v else 0.0 for n, v in self.nominal.items()]
+        far = [
+            np.log1p(farthest(self.tolerance, _SCALES.get(name, _SCALE))) if value else 0.0
+            for name, value in self.nominal.items()
+        ]
         low, high = [-f for f in far], far
         for name, unit in zip(self.effects, self.units, strict=True):
             parameter = fx.parameter(name)

@@ -14,6 +14,7 @@ from fjr_sim_node import effects as fx
 from .cell_fits import CellFit, CellFitter
 from .equivalents import ONE_CAUSE, founded, holders, partners, plainness
 from .found import Found
+from .friction_left import FRICTION, lacks_friction
 from .gains import Gain, closed, gain, left_of, stands_for
 from .harmonics import with_second_harmonic
 from .presence import at_its_bound
@@ -80,12 +81,16 @@ class Stepwise:
                 break
             fits = self._extended(found.best, found.steps[0])
             chosen = self._repeating(fits, found)
-            if chosen is None and self._fitter.evidence.slow:
+            slow = self._fitter.evidence.slow
+            if chosen is None and slow:
                 fits = self._pairs(fits, found.steps[0])
                 chosen = self._repeating(fits, found)
             if chosen is None and not self._over and self._misses(found.best) > _MUCH:
                 passed = [fit.effects[-1] for fit in fits]
                 fits = self._extended(found.best, found.steps[0], passed)
+                chosen = self._repeating(fits, found)
+            if chosen is None and not slow and not self._over:
+                fits = self._frictions(fits, found)
                 chosen = self._repeating(fits, found)
             if chosen is None:
                 break
@@ -115,14 +120,27 @@ class Stepwise:
             found.alternatives[other.effects[-1]] = self._tied(other, fits, without)
             found.steps[:] = [*before, without, other]
 
-    def _pairs(self, fits: Sequence[CellFit], refit: CellFit) -> list[CellFit]:
+    def _pairs(
+        self, fits: Sequence[CellFit], refit: CellFit, tried: Sequence[str] = ()
+    ) -> list[CellFit]:
         """Return the leading fits with each promising effect more, best on unseen parts first.
 
         Causes of slow motion may show only together: friction and gravity, say, are offsets of
         every short way, so one alone leaves as much as it takes away.
         """
-        pairs = [pair for fit in fits[:_PARENTS] for pair in self._extended(fit, refit)]
+        pairs = [pair for fit in fits[:_PARENTS] for pair in self._extended(fit, refit, tried)]
         return self._ranked(pairs, refit)
+
+    def _frictions(self, fits: Sequence[CellFit], found: Found) -> list[CellFit]:
+        """Return pairs of laws of friction, where most of what is missing goes with velocity.
+
+        Of a friction that falls from breakaway and then grows, neither law alone is much better.
+        """
+        laws = [fit for fit in fits if fit.effects[-1] in FRICTION]
+        if not laws or not lacks_friction(self._fitter, found.best):
+            return []
+        others = [e for e in self._effects if e not in FRICTION]
+        return self._pairs(laws, found.steps[0], others)
 
     def _repeating(self, fits: Sequence[CellFit], found: Found) -> CellFit | None:
         """Return what `_chosen` takes of the fits that close enough, and keep them all."""

@@ -62,7 +62,7 @@ def test_a_torque_that_went_on_between_its_samples_is_told_from_one_that_was_hel
     timing = timed(runs(finer), NOMINAL, 0.1, lambda _: None)
     assert timing.notes == told
     assert timing.refit.model.plant["jm"] == pytest.approx(NOMINAL["jm"], rel=0.05)
-    assert (timing.held is None) == (not told)
+    assert timing.held == (not told)
 
 
 @pytest.mark.parametrize(("finer", "held"), [(1, True), (FINER, False)])
@@ -73,10 +73,10 @@ def test_half_a_sample_of_delay_of_a_signal_is_a_torque_that_was_held(finer, hel
     flowing = with_continuous_torque(recorded, by_hold.evidence.simulator.loop)
     by_signal = CellFitter(Evidence(flowing, NOMINAL), NOMINAL, 0.1)
     refit = by_signal.refit()
-    timing = Timing(by_signal, refit, (CONTINUOUS,), Timing(by_hold, by_hold.refit()))
-    assert not timing.better_held(refit)
+    timing = Timing(by_signal, refit, (CONTINUOUS,), False, Timing(by_hold, by_hold.refit()))
+    assert timing.other_if_better(refit) is None
     proposals = by_signal.screening(refit, "delay").proposals()
     late = by_signal.add(refit, "delay", proposals) if proposals else None
     samples = late.model.effects["delay.time_s"] * RATE if late else 0.0
     assert samples == pytest.approx(0.5 if held else 0.0, abs=0.1)
-    assert timing.better_held(late or refit) == held
+    assert (timing.other_if_better(late or refit) is timing.other) == held

@@ -1,7 +1,9 @@
-"""A datasheet that is off by more than its tolerance: the second look at what a first one found.
+"""Fits that end as far from the datasheet as they may go: further looks at what a first one found.
 
 Fits look a few tolerances away from the datasheet. A stiffness that is off by half lies beyond;
-then nothing explains the gap, or what has a gain of its own does, such as an eccentric encoder.
+then nothing explains the gap, or what has a gain of its own does, such as an eccentric encoder. Or
+a datasheet that is right was left, since a cause was missing: an inertia that is twice as great
+follows noise and ripple of a recorded torque less, and beside it what is missing shows little.
 """
 
 from __future__ import annotations
@@ -15,9 +17,10 @@ from .outcome.diagnosis import Diagnosis
 from .record_investigation import RecordInvestigation
 from .which.cell_fits import CellFit
 from .which.fits import Fit
+from .which.search_space import farthest
 
-WIDER = 5.0
-"""How many tolerances the second look takes for one."""
+TIMES = {5.0: "is further off", 0.2: "is right"}
+"""How many tolerances a further look takes for one, and what it supposes of the datasheet."""
 _GAIN = "encoder_eccentricity"
 _HALF = 0.5  # of the misfit: what leaves less does clearly better
 _ALIKE = 1.2  # times the misfit: what leaves less does about as well
@@ -26,7 +29,7 @@ _COMMON = 0.2  # range of the logarithms of ratios to the datasheet, within whic
 Found = Investigation | RecordInvestigation
 
 
-def is_called_for(found: Found) -> bool:
+def are_called_for(found: Found) -> bool:
     """Tell whether a fit ended as far from the datasheet as it may go, or a gain is named."""
     best: Fit | CellFit
     if isinstance(found, Investigation):
@@ -41,7 +44,7 @@ def is_called_for(found: Found) -> bool:
 
 
 def says_more(second: Diagnosis, first: Diagnosis, nominal: Mapping[str, float]) -> bool:
-    """Tell whether the second look explains more, or as much by fewer effects.
+    """Tell whether a further look explains more, or as much by fewer effects.
 
     All parameters off by one factor are a gain, and no better than one that is named.
     """
@@ -53,8 +56,13 @@ def says_more(second: Diagnosis, first: Diagnosis, nominal: Mapping[str, float])
     return left[0] < _HALF * left[1]
 
 
-def said(second: Diagnosis, nominal: Mapping[str, float], tolerance: float) -> str:
-    """Return what of the datasheet is off by more than its tolerance."""
+def said(second: Diagnosis, nominal: Mapping[str, float], tolerance: float, times: float) -> str:
+    """Return what a further look, which took so many tolerances for one, says of the datasheet."""
+    if times < 1.0:
+        return (
+            f"Fits that may go {farthest(tolerance):.0%} from the datasheet explain less than "
+            f"those that keep within {farthest(times * tolerance):.0%} of it; so these count."
+        )
     off = {name: ratio - 1.0 for name, ratio in _ratios(second, nominal).items()}
     far = [
         f"{name} is {100.0 * abs(by):.0f} % {'above' if by > 0.0 else 'below'} it"

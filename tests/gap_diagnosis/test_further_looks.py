@@ -30,7 +30,7 @@ def test_a_stiffness_that_is_far_off_is_no_eccentric_encoder(case, as_record):
     assert found.parameters["k0"].value == pytest.approx(case.rig["k0"], rel=0.01)
 
 
-def test_without_time_there_is_no_second_look(case):
+def test_without_time_there_are_no_further_looks(case):
     nominal = {**PLANT.defaults(), "k0": TOO_STIFF}
     told: list[str] = []
     investigate_any(case.recorded, nominal, effects=FEW, budget_s=0.01, progress=told.append)
