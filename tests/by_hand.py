@@ -39,7 +39,12 @@ def joint_state(stamp: int, **field: float) -> Any:
 
 
 class Rig:
-    """What a test hears of a run, as a recorder that paces it, and what it says itself."""
+    """What a test hears of a run, as a recorder that paces it, and what it says itself.
+
+    Attributes:
+        step_ns: how far it lets the run go on at each look, by the stamps; as far as it got, if
+            None.
+    """
 
     def __init__(self, peer: Peer) -> None:
         from builtin_interfaces.msg import Time
@@ -53,10 +58,15 @@ class Rig:
         self.link = peer.listen(JointState, "link_position", runtime.SIGNAL_QOS)
         self.clock = peer.listen(Clock, "/clock", runtime.CLOCK_QOS)
         recorded = peer.node.create_publisher(Time, "recorded", runtime.EXPERIMENT_QOS)
+        self.step_ns: int | None = None
+        paced = 0
 
         def pace() -> None:
+            nonlocal paced
             if self.torque:
-                recorded.publish(self.torque[-1].header.stamp)
+                newest = stamp_ns(self.torque[-1])
+                paced = newest if self.step_ns is None else min(newest, paced + self.step_ns)
+                recorded.publish(Time(sec=paced // 10**9, nanosec=paced % 10**9))
 
         peer.after_each_look = pace
 

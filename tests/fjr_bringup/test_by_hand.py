@@ -6,7 +6,6 @@ import os
 import signal
 import threading
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,6 +24,7 @@ from processes import wait_for
 from fjr_bringup.campaign.progress import CampaignProgress
 from fjr_bringup.graph import conductor
 from fjr_bringup.graph.graph_run import run_campaign
+from fjr_bringup.graph.recorder import Recorder
 from fjr_kit.errors import InputError
 from fjr_sim_node.simulation.simulator import SIMULATOR, run_realization
 
@@ -203,18 +203,40 @@ def test_nodes_may_be_started_again_mid_run_and_ended_in_any_order(start, rig, o
 
 
 class Helper(threading.Thread):
-    """Does something to a campaign's graph once its first realization runs."""
+    """Does something to a campaign's graph in the middle of its first realization.
 
-    def __init__(self, folder: Path, act: Callable[[], None]) -> None:
+    The recorder waits meanwhile, and with it, a window of samples later, the graph.
+    """
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, act: Callable[[], None]) -> None:
         super().__init__()
-        self._begun, self._act = folder / "log" / "simulator.log", act
+        self._act, self._begun, self._acted = act, threading.Event(), threading.Event()
+        self.failure: BaseException | None = None
+        poll = Recorder.poll
+
+        def waiting_poll(recorder: Recorder) -> int:
+            if recorder.samples:
+                self._begun.set()
+                self._acted.wait()
+            return poll(recorder)
+
+        monkeypatch.setattr(Recorder, "poll", waiting_poll)
         self.start()
 
     def run(self) -> None:
-        wait_for(
-            lambda: self._begun.exists() and "realization 0" in self._begun.read_text(), "a run"
-        )
-        self._act()
+        try:
+            wait_for(self._begun.is_set, "a run")
+            self._act()
+        except BaseException as failure:
+            self.failure = failure
+        finally:
+            self._acted.set()
+
+    def end(self) -> None:
+        """Wait until all is done; raise what went wrong."""
+        self.join()
+        if self.failure is not None:
+            raise self.failure
 
 
 class Progress(CampaignProgress):
@@ -229,24 +251,28 @@ class Progress(CampaignProgress):
 
 
 def test_a_paused_campaign_is_not_called_hung(domain, tmp_path, start, monkeypatch):
-    def pause_until_it_is_noticed() -> None:
-        assert fjr(start, "pause").startswith("paused: ")
+    def play_once_the_pause_is_noticed() -> None:
         wait_for(lambda: "The simulation is paused: " in progress.said, "the campaign to notice")
         assert fjr(start, "play").startswith("playing: ")
 
+    def pause() -> None:
+        assert fjr(start, "pause").startswith("paused: ")
+        player.start()
+
     monkeypatch.setattr(conductor, "_STALL_S", 5.0)
-    what = campaign(base=0.125, excitation={"f_min_hz": 1.0, "f_max_hz": 40.0})
+    player = threading.Thread(target=play_once_the_pause_is_noticed)
+    what = campaign(base=0.5, excitation={"f_min_hz": 1.0, "f_max_hz": 40.0})
     with Progress() as progress:
-        helper = Helper(tmp_path / "graph", pause_until_it_is_noticed)
+        helper = Helper(monkeypatch, pause)
         run_campaign(what, tmp_path / "graph", progress=progress)
-    helper.join()
+    helper.end(), player.join()
     assert contents(tmp_path / "graph") == contents(in_batch(what, tmp_path / "batch"))
 
 
-def test_a_realization_with_a_trip_is_not_kept(domain, tmp_path, start):
-    what = campaign(base=0.125, excitation={"f_min_hz": 1.0, "f_max_hz": 40.0})
-    helper = Helper(tmp_path / "graph", lambda: fjr(start, "estop"))
+def test_a_realization_with_a_trip_is_not_kept(domain, tmp_path, start, monkeypatch):
+    what = campaign(base=0.5, excitation={"f_min_hz": 1.0, "f_max_hz": 40.0})
+    helper = Helper(monkeypatch, lambda: fjr(start, "estop"))
     with pytest.raises(InputError, match="not kept: the controller tripped: emergency stop"):
         in_graph(what, tmp_path / "graph")
-    helper.join()
+    helper.end()
     assert contents(tmp_path / "graph") == {}
