@@ -36,7 +36,7 @@ _READ_AT_RUN_TIME = re.compile(
     r"(FJR|ROS|FASTDDS|FASTRTPS|PYTEST)_\w+|XDG_\w+_HOME|COLUMNS|TMPDIR|_"
 )
 _OF_OTHERS = (
-    "scipy.linalg",  # numba imports it for its first kernel
+    *("scipy.linalg", "scipy.signal"),  # numba imports the former for its first kernel
     *("typer", "rich.progress", "pydantic", "yaml", "rosbags.rosbag2", "rclpy.node"),
     *(f"{package}_msgs.msg" for package in ("diagnostic", "rosgraph", "sensor", "std")),
     "rcl_interfaces.srv",
