@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import re
 import signal
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
-from processes import Starter, completed
+from processes import Starter
 
 from bla_analyzer import Fit
 from fjr_bringup.campaign.plan import CAMPAIGN_FILE, Campaign
@@ -29,17 +27,14 @@ SHORT = [
 ]
 
 
-def fjr(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
-    return completed(sys.executable, "-m", "fjr_cli", *arguments, cwd=cwd)
-
-
 def files(folder: Path) -> dict[str, bytes]:
     return {str(f.relative_to(folder)): f.read_bytes() for f in sorted(folder.glob("level_*/*"))}
 
 
-def test_simulate_makes_a_new_folder_and_names_it_last(tmp_path):
-    done = fjr("simulate", *SHORT, "--level", "1e-3", "--level", "7e-3", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
+def test_simulate_makes_a_new_folder_and_names_it_last(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    done = run("simulate", *SHORT, "--level", "1e-3", "--level", "7e-3", "--workers", "1")
+    assert done.exit_code == 0, done.stderr
     folder = tmp_path / done.stdout.splitlines()[-1]
     assert re.fullmatch(r"\d{4}-\d\d-\d\d_\d{6}", folder.name)
     assert folder.parent == tmp_path / "experiments"
@@ -64,13 +59,13 @@ def test_realizations_are_played_in_the_order_that_the_description_gives(order, 
     assert starts == [30.0 * number for number in range(6)]
 
 
-def test_options_win_over_settings_and_these_over_the_file(tmp_path):
+def test_options_win_over_settings_and_these_over_the_file(run, tmp_path):
     rig = tmp_path / "rig.yaml"
     rig.write_text("/rig/simulator: {ros__parameters: {k1: 5.0, fs: 1.0}}\n")
     own = ["--rig", str(rig), "--set", "simulator.k1=7", "--workers", "1"]
-    arguments = [*own, "--out", "x", *SHORT]
-    done = fjr("simulate", *arguments, "--set", "excitation.seed=3", "--seed", "4", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
+    arguments = [*own, "--out", tmp_path / "x", *SHORT]
+    done = run("simulate", *arguments, "--set", "excitation.seed=3", "--seed", "4")
+    assert done.exit_code == 0, done.stderr
     values = Campaign.create(tmp_path / "x" / "campaign.yaml").values
     assert values["simulator"]["k1"] == 7.0 and values["simulator"]["fs"] == 1.0
     assert values["excitation"]["seed"] == 4
@@ -154,18 +149,18 @@ def test_resuming_makes_only_what_is_missing_with_the_same_bytes(run, tmp_path):
 
 @pytest.mark.parametrize("signal_number", [signal.SIGINT, signal.SIGTERM])
 def test_interrupted_run_keeps_bags_and_resumes_to_the_same_bytes(
-    tmp_path, start: Starter, signal_number
+    run, tmp_path, start: Starter, signal_number
 ):
     options = ["--realizations", "3", "--periods", "3", "--transient-periods", "0",
                "--set", "excitation.base_frequency_hz=0.5",
                "--set", "excitation.f_min_hz=0.5"]  # fmt: skip
     out = tmp_path / "x"
-    run = start("fjr_cli", "run", "--out", str(out), *options)
+    campaign = start("fjr_cli", "run", "--out", str(out), *options)
     first, second = bag_folder(out, 0, 0), out / f".{bag_folder(out, 0, 1).name}.partial"
-    run.wait_for(second.exists, "the second bag")
-    assert run.interrupt(signal_number) in INTERRUPTED, run.output
-    assert f"Interrupted: 1 of 3 bags are finished and kept in {out}" in run.output
-    assert f"to go on: fjr run --out {out}" in run.output
+    campaign.wait_for(second.exists, "the second bag")
+    assert campaign.interrupt(signal_number) in INTERRUPTED, campaign.output
+    assert f"Interrupted: 1 of 3 bags are finished and kept in {out}" in campaign.output
+    assert f"to go on: fjr run --out {out}" in campaign.output
     assert [path.name for path in out.glob("level_*")] == [first.name]
     assert not list(out.glob(".*"))
     audit(first)
@@ -174,7 +169,7 @@ def test_interrupted_run_keeps_bags_and_resumes_to_the_same_bytes(
     assert "1 of 3 bags are there already." in resumed.output
     assert resumed.output.splitlines()[-1] == str(out)
     whole = tmp_path / "whole"
-    assert fjr("simulate", "--out", str(whole), *options, cwd=tmp_path).returncode == 0
+    assert run("simulate", "--out", whole, *options, "--workers", "1").exit_code == 0
     assert files(out) == files(whole)
 
 
