@@ -98,7 +98,10 @@ def import_records(
     if out is not None and (out.exists() or out.is_symlink()):
         raise InputError(f"{out}: exists already; choose another folder or remove it.")
     options = ImportOptions(
-        columns=parse_map([part for spec in column_map for part in spec.split(",")]),
+        columns=parse_map(
+            [part for spec in column_map for part in spec.split(",")],
+            described=bool(controller),
+        ),
         sample_rate_hz=sample_rate_hz,
         samples_per_period=samples_per_period,
         transient_periods=transient_periods,

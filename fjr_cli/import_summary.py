@@ -59,11 +59,15 @@ def _file(
                 yield f"  {quantity:<10} not recorded"
             continue
         values, unit = record.signals[symbol], units[quantity]
-        column = columns[quantity]
+        column = columns.get(quantity)
+        source = (
+            "made by the controller"
+            if column is None
+            else f"{column.name}, times {column.factor:.6g}"
+        )
         yield (
             f"  {quantity:<10} rms {np.sqrt(np.mean(values**2)):.4g} {unit}, from "
-            f"{values.min():.4g} to {values.max():.4g} {unit} ({column.name}, times "
-            f"{column.factor:.6g})"
+            f"{values.min():.4g} to {values.max():.4g} {unit} ({source})"
         )
     timing = record.timing
     if timing.gaps:

@@ -76,11 +76,15 @@ class Column:
         return cls(name.strip(), sign * factor, bool(unit) and not known, unit if known else "")
 
 
-def parse_map(specs: Sequence[str]) -> dict[str, Column]:
+def parse_map(specs: Sequence[str], *, described: bool = False) -> dict[str, Column]:
     """Parse `quantity=[-]column[:unit]` for reference, torque, position, link and time.
 
+    Args:
+        specs: one for each quantity.
+        described: whether the controller is described, which then makes a torque that is missing.
+
     Raises:
-        InputError: a quantity or unit is unknown, named twice, or torque or position is missing.
+        InputError: a quantity or unit is unknown, named twice, or position or torque is missing.
     """
     columns: dict[str, Column] = {}
     for spec in specs:
@@ -97,8 +101,16 @@ def parse_map(specs: Sequence[str]) -> dict[str, Column]:
             )
         columns[quantity] = Column.parse(quantity, source)
     missing = [quantity for quantity in REQUIRED if quantity not in columns]
+    if missing == ["torque"] and described and "reference" in columns:
+        missing = []
     if missing:
-        raise InputError(f"the map lacks {' and '.join(missing)}; add {missing[0]}=column.")
+        made = ""
+        if missing == ["torque"]:
+            made = (
+                ", or, where reference and position were logged alone, describe the whole "
+                "controller that made it (--controller)"
+            )
+        raise InputError(f"the map lacks {' and '.join(missing)}; add {missing[0]}=column{made}.")
     _refuse_both_axes(columns)
     return columns
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from controller_node import controller_file
 from controller_node.law import as_transfer_function, law_of
+from controller_node.transfer_function import TransferFunction
 from fjr_interface.bags.folder_names import bag_folder
 from fjr_interface.bags.writer import BagWriter
 from fjr_interface.topics import LINK_POSITION, MOTOR_POSITION, MOTOR_TORQUE, REFERENCE
@@ -62,14 +63,19 @@ def read_files(files: Sequence[str | Path], options: ImportOptions) -> Understoo
         )
     laws = [controller_file.read_controller(path) for path in options.controllers]
     samples = [read_samples(Path(file), options) for file in files]
-    rate = _grid_rate(samples)
-    records = [understand(each, rate or each.timing.rate_hz, options) for each in samples]
-    controllers: list[dict[str, Any] | None] = [None] * len(records)
-    for number, record in enumerate(records) if laws else ():
-        which = number if len(laws) > 1 else 0
-        source = str(options.controllers[which])
-        controllers[number] = controller_file.describe(laws[which], record.sample_rate_hz, source)
-        _check_controller(record, controllers[number] or {}, source)
+    common = _grid_rate(samples)
+    rates = [common or each.timing.rate_hz for each in samples]
+    sources = [str(path) for path in options.controllers] * (1 if len(laws) > 1 else len(samples))
+    controllers: list[dict[str, Any] | None] = [None] * len(samples)
+    for number, source in enumerate(sources):
+        structure = laws[number if len(laws) > 1 else 0]
+        controllers[number] = controller_file.describe(structure, rates[number], source)
+    records = [
+        understand(each, rate, options, _maker(each.path, controller, rate, options))
+        for each, rate, controller in zip(samples, rates, controllers, strict=True)
+    ]
+    for record, controller, source in zip(records, controllers, sources, strict=False):
+        _check_controller(record, controller or {}, source)
     descriptions, notes = describe(records, options.levels, controllers, options.columns)
     return Understood(tuple(records), tuple(descriptions), tuple(notes))
 
@@ -80,6 +86,20 @@ def _grid_rate(samples: Sequence[Samples]) -> float | None:
         return None
     even = [each.timing.rate_hz for each in samples if each.timing.stamps_s is None]
     return even[0] if even else min(each.timing.rate_hz for each in samples)
+
+
+def _maker(
+    path: Path, controller: dict[str, Any] | None, rate_hz: float, options: ImportOptions
+) -> TransferFunction | None:
+    """Return the law that makes a torque which was not recorded; None where it was."""
+    if "torque" in options.columns:
+        return None
+    if controller is None or "unknown" in controller or "reference" not in options.columns:
+        raise InputError(
+            f"{path}: no torque is mapped, and only a reference and a controller that is described "
+            "in all its gains could make it; map the torque, or describe the controller."
+        )
+    return as_transfer_function(law_of(controller, rate_hz))
 
 
 def _check_controller(record: Record, controller: dict[str, Any], source: str) -> None:

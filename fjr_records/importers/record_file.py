@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from controller_node.transfer_function import TransferFunction
 from fjr_kit.errors import InputError
 
 from ..driven import wrong_sign
@@ -16,6 +17,7 @@ from . import coherence
 from .columns import read_columns
 from .import_map import Column
 from .integrals import DRIFTS, integrals
+from .made_torque import MADE, made_torque
 from .repetition import Repetition, find_repetition, insists
 from .stamps import LONGEST_S, Timing, read_timing, resample
 from .wraps import without_wraps
@@ -161,8 +163,17 @@ def _lost_sign(column: np.ndarray) -> bool:
     return not between.any() and bool((column < _HALF).any()) and bool((column % 1 == 0).all())
 
 
-def understand(samples: Samples, rate_hz: float, options: ImportOptions) -> Record:
-    """Bring a file onto the grid and find its period; raise InputError where it cannot be right."""
+def understand(
+    samples: Samples, rate_hz: float, options: ImportOptions, law: TransferFunction | None = None
+) -> Record:
+    """Bring a file onto the grid and find its period; raise InputError where it cannot be right.
+
+    Args:
+        samples: of the file.
+        rate_hz: of the grid.
+        options: how to understand them.
+        law: what makes a torque that was not recorded.
+    """
     path, timing, values = samples.path, samples.timing, samples.values
     notes = (*samples.notes, *timing.notes)
     if timing.stamps_s is not None:
@@ -171,6 +182,9 @@ def understand(samples: Samples, rate_hz: float, options: ImportOptions) -> Reco
     values, integrated = integrals(values, options.columns, rate_hz)
     notes += integrated
     signals = {SYMBOLS[quantity]: each for quantity, each in values.items()}
+    if law is not None and "u" not in signals:
+        signals["u"] = made_torque(law, signals["r"], signals["y"], rate_hz)
+        notes += (MADE,)
     if not np.ptp(signals["y"]) > 0:
         raise InputError(f"{path}: the position is constant; map the column that carries it.")
     found: Repetition | str = DRIFTS
