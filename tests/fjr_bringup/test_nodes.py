@@ -181,15 +181,15 @@ def test_a_first_position_may_overtake_its_reference(start, rig):
 def test_a_simulator_started_again_plays_the_next_start(start, rig):
     from std_srvs.srv import Trigger
 
-    nodes = by_hand(start, periods=1)
+    nodes = by_hand(start)
     simulator, controller, _ = [nodes[letter]() for letter in "sce"]
-    first = rig.hear_all_of(described(periods=1))
+    first = rig.hear_all_of(described())
     assert simulator.interrupt() == 0
     nodes["s"]()  # it gets the latched experiment and starts, but no reference comes
     controller.wait_for_text("Waiting for the reference of 0.001000 s.")
     rig.torque.clear()
     assert rig.peer.call(Trigger, "excitation/start", Trigger.Request()).success
-    np.testing.assert_array_equal(rig.hear_all_of(described(periods=1)), first)
+    np.testing.assert_array_equal(rig.hear_all_of(described()), first)
 
 
 @pytest.mark.parametrize(
