@@ -27,21 +27,21 @@ from fjr_sim_node.simulation.simulator import SIMULATOR, run_realization
 
 @pytest.mark.parametrize("order", list(map("".join, itertools.permutations("sce"))), ids=str)
 def test_nodes_started_in_any_order_play_the_experiment(start, rig, order):
-    nodes = by_hand(start, periods=1)
+    nodes = by_hand(start)
     started = [nodes[letter]() for letter in order]
-    torque = rig.hear_all_of(described(periods=1))
-    batch = run_realization(SIMULATOR.defaults(), described(periods=1))
+    torque = rig.hear_all_of(described())
+    batch = run_realization(SIMULATOR.defaults(), described())
     np.testing.assert_array_equal(torque, batch.torque)
     for node in started:
         assert node.interrupt() == 0
 
 
 def test_a_late_controller_is_waited_for_and_named(start, rig):
-    nodes = by_hand(start, periods=1, pace="clock")
+    nodes = by_hand(start, pace="clock")
     simulator, excitation = nodes["s"](), nodes["e"]()
     excitation.wait_for_text("Waiting for controller to subscribe to /rig/reference.")
     controller = nodes["c"]()
-    last = described(periods=1).stamps_ns[-1]
+    last = described().stamps_ns[-1]
     rig.peer.spin_until(lambda: rig.torque and stamp_ns(rig.torque[-1]) == last, "the last torque")
     controller.interrupt(), excitation.interrupt(), simulator.interrupt()
     assert "Waiting" not in controller.output
