@@ -135,16 +135,26 @@ def _load() -> None:
 
 
 def _serve(connection: Connection) -> Any:
-    """Answer the tests; return in each fork what it is to run, and None at the end of the tests."""
+    """Answer the tests; return in each fork what it is to run, and None at the end of the tests.
+
+    What runs then still, of tests that were killed, is ended.
+    """
+    running = set()
     while True:
         try:
             verb, what = connection.recv()
         except EOFError:
+            for pid in running:
+                with contextlib.suppress(ProcessLookupError):
+                    os.killpg(pid, signal.SIGKILL)
             return None
         if verb == "poll":
             pid, status = os.waitpid(what, os.WNOHANG)
+            running.discard(pid)
             connection.send(os.waitstatus_to_exitcode(status) if pid else None)
-        elif not os.fork():
+        elif pid := os.fork():
+            running.add(pid)
+        else:
             return what
 
 
