@@ -35,6 +35,8 @@ class Peer:
         import rclpy
         from rclpy.executors import SingleThreadedExecutor
 
+        import fjr_interface.ros.runtime  # noqa: F401 - chooses profiles that rclpy.init reads
+
         self.context = rclpy.Context()
         rclpy.init(context=self.context, domain_id=domain)
         self.node = rclpy.create_node("peer", namespace="/rig", context=self.context)
