@@ -153,11 +153,9 @@ def investigate_any(
         return _look(recorded, nominal, tolerance, effects, budget_s, progress)
 
     found = look(tolerance, budget_s)
-    if not further_looks.are_called_for(found):
-        return found
     took = time.monotonic() - begun
     bare = Model.nominal(nominal).plant
-    for times, supposed in further_looks.TIMES.items():
+    for times, supposed in further_looks.called_for(found).items():
         left = begun + budget_s - time.monotonic()
         if left < took:  # another look takes about as long
             break

@@ -19,8 +19,8 @@ from .which.cell_fits import CellFit
 from .which.fits import Fit
 from .which.search_space import farthest
 
-TIMES = {5.0: "is further off", 0.2: "is right"}
-"""How many tolerances a further look takes for one, and what it supposes of the datasheet."""
+WIDER, CLOSER = 5.0, 0.2
+"""How many tolerances a further look takes for one."""
 _GAIN = "encoder_eccentricity"
 _HALF = 0.5  # of the misfit: what leaves less does clearly better
 _ALIKE = 1.2  # times the misfit: what leaves less does about as well
@@ -29,18 +29,29 @@ _COMMON = 0.2  # range of the logarithms of ratios to the datasheet, within whic
 Found = Investigation | RecordInvestigation
 
 
-def are_called_for(found: Found) -> bool:
-    """Tell whether a fit ended as far from the datasheet as it may go, or a gain is named."""
+def called_for(found: Found) -> dict[float, str]:
+    """Return the further looks to take: how many tolerances for one, and what that supposes.
+
+    None, unless a fit ended as far from the datasheet as it may go, or a gain is named. Where a
+    recorded torque drives the model, whose noise an inertia may follow, the datasheet may be right.
+    """
     best: Fit | CellFit
+    driven = False
     if isinstance(found, Investigation):
         if found.attribution is None or not found.diagnosis.steps:
-            return False
+            return {}
         named = bool(found.diagnosis.effects)
         best = found.attribution.best if named else found.attribution.refit
     else:
         best = found.found.best
-    ended = at_limits(best.space, best.solution.x, best.model.plant)
-    return bool(ended) or _GAIN in found.diagnosis.effects
+        driven = not found.evidence.slow and None in found.evidence.player.loop.laws
+    ended = bool(at_limits(best.space, best.solution.x, best.model.plant))
+    looks = {}
+    if ended or _GAIN in found.diagnosis.effects:
+        looks[WIDER] = "is further off"
+    if ended and driven:
+        looks[CLOSER] = "is right"
+    return looks
 
 
 def says_more(second: Diagnosis, first: Diagnosis, nominal: Mapping[str, float]) -> bool:
