@@ -1,10 +1,11 @@
 """A process from which tests fork programs: what these import of others is there already.
 
-Most of the processor time of a node's start goes into numpy, numba and rclpy. The nursery has
-imported them, and nothing of this project; a program that it forks is otherwise as one that
-`python -m` starts: in a session of its own, with its own arguments, folder, environment, streams
-and exit status. Where the environment differs in more than what programs read when they run, as
-in PYTHONPATH, `python -m` it is. Nodes that a campaign or a launch file starts always are.
+Most of the processor time of a node's start goes into numpy and numba. The nursery has imported
+them, and nothing of this project, nor rclpy, which begins threads; a program that it forks is
+otherwise as one that `python -m` starts: in a session of its own, with its own arguments, folder,
+environment, streams and exit status. Where the environment differs in more than what programs read
+when they run, as in PYTHONPATH, `python -m` it is. Nodes that a campaign or a launch file starts
+always are.
 
 This file is also the program of the nursery itself; the end of its tests ends it.
 """
@@ -35,12 +36,12 @@ _NOBODY = "0" * 32  # as long as each mark
 _READ_AT_RUN_TIME = re.compile(
     r"(FJR|ROS|FASTDDS|FASTRTPS|PYTEST)_\w+|XDG_\w+_HOME|COLUMNS|TMPDIR|_"
 )
+_ALONE = {"OPENBLAS_NUM_THREADS": "1"}
+"""Environment in which no library here begins threads: a fork would have none of them, and could
+wait for ever for a lock that one of them held."""
 _OF_OTHERS = (
     *("scipy.linalg", "scipy.signal"),  # numba imports the former for its first kernel
-    *("typer", "rich.progress", "pydantic", "yaml", "rosbags.rosbag2", "rclpy.node"),
-    *(f"{package}_msgs.msg" for package in ("diagnostic", "rosgraph", "sensor", "std")),
-    "rcl_interfaces.srv",
-    "std_srvs.srv",
+    *("typer", "rich.progress", "pydantic", "yaml", "rosbags.rosbag2"),
 )
 
 
@@ -90,7 +91,7 @@ class Nursery:
         self._process = subprocess.Popen(
             [sys.executable, __file__, str(theirs.fileno())],
             pass_fds=[theirs.fileno()],
-            env=self._environment,
+            env={**self._environment, **_ALONE},
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             start_new_session=True,
@@ -130,6 +131,9 @@ def _load() -> None:
 
     cpu_target.typing_context.refresh()
     cpu_target.target_context.refresh()
+    assert len(list(Path("/proc/self/task").iterdir())) == 1, (
+        "a process of several threads must not fork"
+    )
     gc.collect()
     gc.freeze()  # a collection in a fork would copy the pages of all that is here
 

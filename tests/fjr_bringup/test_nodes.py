@@ -61,6 +61,7 @@ def test_what_a_run_publishes_beside_the_signals(start, rig):
     from fjr_interface.ros import runtime
 
     nodes = by_hand(start)
+    rig.step_ns = 50_000_000  # of the clock's ticks the last one waits for each look, no more
     nodes["s"]()
     writers = rig.peer.node.count_publishers
     rig.peer.spin_until(lambda: writers("link_position"), "the simulator")
