@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -13,10 +12,11 @@ from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.record_investigation import LOST, RecordInvestigation, investigate_records
 from gap_diagnosis.which.cell_fits import CellFitter
 from gap_diagnosis.which.equivalents import founded
+from gap_diagnosis.which.exchange import replace_bounded
+from gap_diagnosis.which.extension import Extension
 from gap_diagnosis.which.found import Found
 from gap_diagnosis.which.gains import left_of
 from gap_diagnosis.which.presence import LEAST_INVARIANCE_P, at_its_bound, invariance
-from gap_diagnosis.which.stepwise import Stepwise
 
 BARE = {**NOMINAL, "fs": 0.0, "fsm": 0.0, "fv": 0.0, "fvm": 0.0}
 LOOKED_FOR = (
@@ -73,11 +73,11 @@ def test_all_effects_are_screened_anew_once_a_cause_has_closed_most_of_the_error
         def gain_beside(self, *_):
             return 1.0
 
-    search = Stepwise(fitter, others)
+    extension = Extension(fitter, others, lambda _: None)
     fitter.screening = lambda _, effect: looked.append(effect) or Noted()
     assert left_of(fitter, fit, refit) < 0.1
-    search._first = refit, dict.fromkeys(others, Noted())
-    assert set(search._screened(fit, others)) == set(looked) == set(others)
+    extension._first = refit, dict.fromkeys(others, Noted())
+    assert set(extension.screened(fit, others)) == set(looked) == set(others)
 
 
 @pytest.mark.parametrize("scatter", [0.0, 0.15])
@@ -111,8 +111,8 @@ def test_a_law_whose_shape_comes_to_a_bound_gives_way_to_the_law_that_it_is_ther
         fits.append(fitter.further(fitter.add(fits[-1], effect, proposals)))
     assert at_its_bound(fits[-1], "cable")
     names = ["cable", "viscous_friction", "coulomb_friction"]
-    search, found = Stepwise(fitter, names, lambda _: None, math.inf), Found(fits)
-    search._replace_bounded(found)
+    found = Found(fits)
+    replace_bounded(found, fitter, Extension(fitter, names, lambda _: None))
     assert [fit.effects for fit in found.steps[1:]] == [
         ("coulomb_friction",),
         ("coulomb_friction", "viscous_friction"),

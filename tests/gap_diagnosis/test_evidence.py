@@ -16,7 +16,7 @@ from fjr_sim_node.plant import PLANT, coefficients
 from fjr_sim_node.simulation.closed_loop import simulate
 from gap_diagnosis.gates.bag_deviations import GROUPS
 from gap_diagnosis.model.evidence import Evidence
-from gap_diagnosis.model.simulated_rig import Model
+from gap_diagnosis.model.rig_model import Model
 from gap_diagnosis.notes import at_limits
 from gap_diagnosis.outcome.diagnosis import Figure
 from gap_diagnosis.tested_causes import causes_with_tests
@@ -171,7 +171,7 @@ def test_a_leading_fit_is_taken_to_its_end_before_it_is_compared(monkeypatch):
     refit = fitter.refit()
     proposals = fitter.screening(refit, "torque_saturation").proposals()
     assert not fitter.add(refit, "torque_saturation", proposals).solution.converged
-    (fit,) = Stepwise(fitter, ["torque_saturation"])._extended(refit, refit)
+    (fit,) = Stepwise(fitter, ["torque_saturation"]).extension.extended(refit, refit)
     assert fit.solution.converged
     assert fit.model.effects["torque_saturation.limit_nm"] == pytest.approx(60.0, rel=0.01)
 
@@ -186,7 +186,8 @@ def test_what_gains_but_closes_little_does_not_end_the_search(monkeypatch):
     assert closed(fitter, quiet, refit) < LEAST_CLOSED < closed(fitter, fit, refit)
     search = Stepwise(fitter, ["torque_bias", "delay"])
     found = [quiet, fit]
-    monkeypatch.setattr(search, "_extended", lambda parent, _: [] if parent.effects else found)
+    fits = lambda parent, *_: [] if parent.effects else found  # noqa: E731
+    monkeypatch.setattr(search.extension, "extended", fits)
     assert search.run(refit).best is fit
 
 

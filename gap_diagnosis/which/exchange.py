@@ -1,0 +1,63 @@
+"""Causes that a search has found, put in place of each other while it goes on."""
+
+from __future__ import annotations
+
+from .cell_fits import CellFitter
+from .extension import Extension
+from .found import Found
+from .gains import stands_for
+from .presence import at_its_bound
+
+_FEWEST = 3
+"""Causes of which one may hinder the others: of two, each was chosen beside the other or none."""
+
+
+def replace_bounded(found: Found, fitter: CellFitter, extension: Extension) -> None:
+    """Put another effect in the place of a former cause whose shape has come to a bound.
+
+    While a further cause is missing, a law may do in part what that does, and beside it end as a
+    limit case of another law: a cable that gives way at once is viscous friction.
+
+    Args:
+        found: what the search has found, whose steps are changed.
+        fitter: fits explanations.
+        extension: extends them.
+    """
+    for effect in found.best.effects[:-1]:
+        best = found.best
+        if not at_its_bound(best, effect):
+            continue
+        without = fitter.without(best, effect)
+        fits = extension.extended(without, found.steps[0])
+        free = [f for f in fits if not at_its_bound(f, f.effects[-1])]
+        other = extension.chosen(free, without)
+        worth = extension.gain(best, without).mean
+        if other is None or not stands_for(extension.gain(best, other), worth):
+            continue
+        before = [fit for fit in found.steps if effect not in fit.effects]
+        found.alternatives[other.effects[-1]] = extension.tied(other, fits, without)
+        found.steps[:] = [*before, without, other]
+
+
+def drop_hindering(found: Found, fitter: CellFitter, extension: Extension) -> None:
+    """Take out former causes without which the others do better; arguments as `replace_bounded`.
+
+    While further causes are missing, a law may do a part of what they do; beside them it holds
+    their sizes away from where they belong. What was added beside it is chosen anew.
+    """
+    for effect in found.best.effects[:-1]:
+        best = found.best
+        if len(best.effects) < _FEWEST:
+            return
+        fewer = fitter.without(best, effect)
+        if not extension.gain(fewer, best).present:
+            continue
+        last = best.effects[-1]
+        rest = fitter.without(fewer, last)
+        fits = extension.ranked(
+            [fewer, *extension.extended(rest, found.steps[0], [last])], rest
+        )  # fmt: skip
+        other = extension.chosen(fits, rest) or fewer
+        before = [fit for fit in found.steps if not {effect, last} & {*fit.effects}]
+        found.alternatives[other.effects[-1]] = extension.tied(other, fits, rest)
+        found.steps[:] = [*before, rest, other]

@@ -1,0 +1,194 @@
+"""One step of the search over causes of records: an explanation with each promising effect more."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+from fjr_sim_node import effects as fx
+
+from .cell_fits import CellFit, CellFitter
+from .equivalents import ONE_CAUSE, founded, holders, partners, plainness
+from .gains import Gain, gain, left_of, stands_for
+from .harmonics import with_second_harmonic
+from .screening import Proposal, Screening
+
+_PROPOSED, _FITTED, _STARTS = (7, 5), (5, 3), (2, 1)
+"""Effects that are tried at several sizes, those of them that are fitted, and from how many starts:
+beside no cause yet, beside others."""
+_POLISHED = 2  # leading fits of a step that are taken further
+_WORTH_A_HARMONIC = 1.3  # a misfit: what noise leaves is no second harmonic
+_AGAIN = 8  # effects that are screened beside a cause, and those that depend on others
+_OUTDATED = 0.1  # of the squared error that is left: then what was screened before is too far
+_MUCH_LESS = 0.3  # of the greatest gain: a cause that gains less waits for the next step
+_START_LESS = 0.2  # of the greatest gain of a start: an effect whose best one gains less waits
+
+Progress = Callable[[str], None]
+
+
+class Extension:
+    """Extends explanations of one set of records by one effect.
+
+    Attributes:
+        effects: identifiers to try.
+    """
+
+    def __init__(self, fitter: CellFitter, effects: Sequence[str], progress: Progress) -> None:
+        """Take what to extend.
+
+        Args:
+            fitter: fits explanations.
+            effects: identifiers to try.
+            progress: told what is tried.
+        """
+        self.effects = effects
+        self._fitter, self._progress = fitter, progress
+        self._first: tuple[CellFit, dict[str, Screening]] | None = None
+
+    def extended(self, parent: CellFit, refit: CellFit, tried: Sequence[str] = ()) -> list[CellFit]:
+        """Return the parent with each promising effect more, best on unseen parts first.
+
+        Args:
+            parent: the explanation to extend.
+            refit: the fit of the base parameters alone.
+            tried: effects that are left out, since they were tried.
+        """
+        names, nominal = self.effects, self._fitter.nominal
+        there = {*parent.effects, *tried, *self._one_cause(parent, refit)}
+        effects = [e for e in names if e not in there]
+        effects = founded(effects, parent.effects, nominal, names)
+        screened = self.screened(parent, effects)
+        later = bool(parent.effects)
+        hopeful = sorted(screened, key=lambda e: -screened[e].gain)[: _PROPOSED[later]]
+        proposals = {e: screened[e].proposals() for e in hopeful}
+        ordered = sorted((e for e in hopeful if proposals[e]), key=lambda e: proposals[e][0][0])
+        chosen = self._worth_a_fit(parent, proposals, ordered[: _FITTED[later]])
+        held = founded(holders(chosen[:2], names), parent.effects, nominal, names)
+        alike = {*partners(chosen[:2], set(effects)), *held}
+        for effect in sorted(alike - set(chosen)):
+            if effect not in proposals:
+                again = screened.get(effect) or self._fitter.screening(parent, effect)
+                proposals[effect] = again.proposals()
+            chosen.append(effect)
+        fits: list[CellFit] = []
+        for number, effect in enumerate(chosen, 1):
+            self._progress(f"{' + '.join((*parent.effects, effect))} ({number} of {len(chosen)})")
+            parts = [f for f in fits if f.effects[-1] in fx.EFFECTS[effect].contains]
+            begun = [p for f in parts for p in self._fitter.from_part(parent, effect, f)]
+            begun = sorted([*begun, *proposals[effect]], key=lambda p: p[0])
+            fit = self._fitter.add(parent, effect, begun, _STARTS[later])
+            if fit is not None:
+                fits.append(fit)
+        fits = self.ranked(fits, parent)
+        first = [fit.effects[-1] for fit in fits[:_POLISHED]]
+        near = len(partners(first[:1], set(first))) > 1
+        leading = [self._enriched(self._settled(f, parent, near)) for f in fits[:_POLISHED]]
+        return self.ranked([*leading, *fits[_POLISHED:]], parent)
+
+    def tied(self, chosen: CellFit, fits: Sequence[CellFit], parent: CellFit) -> list[str]:
+        """Return the effects that unseen parts cannot tell from the chosen one."""
+        first = self.gain(chosen, parent).mean
+        others = [f for f in fits if f is not chosen and f.effects[:-1] == chosen.effects[:-1]]
+        return [f.effects[-1] for f in others if stands_for(self.gain(chosen, f), first)]
+
+    def chosen(self, fits: Sequence[CellFit], parent: CellFit) -> CellFit | None:
+        """Return the best fit whose gain repeats, unless another one gains much more.
+
+        Of those that unseen parts cannot tell from it, one that holds no other as a limit case, the
+        one with the fewest parameters, and then the commoner one.
+        """
+        gains = [gain(self._fitter, fit, parent, fit.acts) for fit in fits]
+        repeating = [
+            fit
+            for fit, found in zip(fits, gains, strict=True)
+            if found.present and found.mean > _MUCH_LESS * gains[0].mean
+        ]
+        if not repeating:
+            return None
+        first = repeating[0]
+        worth = self.gain(first, parent).mean
+        alike = [f for f in repeating if f is first or stands_for(self.gain(first, f), worth)]
+        laws = [fit.effects for fit in alike]
+        return min(alike, key=lambda fit: plainness(fit.effects, fit.space.effects, laws))
+
+    def ranked(self, fits: Sequence[CellFit], parent: CellFit) -> list[CellFit]:
+        """Return fits by what they gain over their parent, the best first."""
+        return sorted(fits, key=lambda fit: -self.gain(fit, parent).mean)
+
+    def gain(self, after: CellFit, before: CellFit) -> Gain:
+        """Return what one fit gains over another on unseen parts."""
+        return gain(self._fitter, after, before)
+
+    def _worth_a_fit(
+        self, parent: CellFit, proposals: Mapping[str, list[Proposal]], ordered: list[str]
+    ) -> list[str]:
+        """Return the effects whose starts gain enough beside the best start of all.
+
+        What gains much less waits for the next step anyway.
+        """
+        gains = {e: self._fitter.begun(parent) - proposals[e][0][0] for e in ordered}
+        most = max(gains.values(), default=0.0)
+        return [e for e in ordered if gains[e] >= _START_LESS * most]
+
+    def _settled(self, fit: CellFit, parent: CellFit, alike: bool) -> CellFit:
+        """Return a fit that leads, taken to its end.
+
+        A fit begins with the weights of what its parent leaves, so one that closes most of that
+        ends elsewhere by the weights of what itself leaves; which of two that are near equivalents
+        does better shows there alone.
+
+        Args:
+            fit: one that leads.
+            parent: the fit that it extends.
+            alike: whether it has a near equivalent that leads as well.
+        """
+        closes_little = left_of(self._fitter, fit, parent) > _OUTDATED
+        if fit.solution.converged and closes_little and not alike:
+            return fit
+        self._progress(f"{' + '.join(fit.effects)}, further")
+        return self._fitter.further(fit)
+
+    def _enriched(self, fit: CellFit) -> CellFit:
+        """Return a fit whose last effect is a ripple with its second harmonic, if that repeats.
+
+        A ripple of two harmonics that is taken for one leaves what looks like a further cause.
+        """
+        effect = fit.effects[-1]
+        if not fx.EFFECTS[effect].ripple or self._fitter.misfit(fit) < _WORTH_A_HARMONIC:
+            return fit
+        self._progress(f"{' + '.join(fit.effects)}, second harmonic")
+        richer = with_second_harmonic(self._fitter, fit, effect)
+        if richer is None or not self.gain(richer, fit).present:
+            return fit
+        # both by the weights of what they leave themselves
+        richer, alone = self._fitter.further(richer), self._fitter.further(fit)
+        return richer if self.gain(richer, alone).present else alone
+
+    def _one_cause(self, parent: CellFit, refit: CellFit) -> list[str]:
+        """Return what could only name a cause of the parent twice; see `ONE_CAUSE`."""
+        left, gap = self._fitter.misfit(parent) - 1.0, self._fitter.misfit(refit) - 1.0
+        return partners(parent.effects, set(self.effects)) if left < ONE_CAUSE * gap else []
+
+    def screened(self, parent: CellFit, effects: Sequence[str]) -> dict[str, Screening]:
+        """Return screenings beside a fit: of all effects the first time, then of those that count.
+
+        What a seed changes hardly depends on causes beside it, so the first changes say which
+        effects may gain beside others; where a cause has closed most of the error, that is not so
+        near any more, and all are screened anew. So are effects that depend on others.
+        """
+        anew = self._first is None or left_of(self._fitter, parent, self._first[0]) < _OUTDATED
+        if self._first is not None and not anew:
+            before, screened = self._first
+            promise = {
+                e: self._fitter.promise(screened[e], before, parent)
+                for e in effects
+                if e in screened and not fx.EFFECTS[e].depends_on_others
+            }
+            best = sorted(promise, key=lambda e: -promise[e])[:_AGAIN]
+            effects = [e for e in effects if e in best or e not in promise]
+        found = {}
+        for effect in effects:
+            self._progress(f"{' + '.join((*parent.effects, effect))}, screened")
+            found[effect] = self._fitter.screening(parent, effect)
+        if anew:
+            self._first = parent, found
+        return found
