@@ -23,7 +23,8 @@ from fjr_bringup import Campaign, simulate_campaign
 from gap_diagnosis import read_nominal
 from gap_diagnosis.any_record import investigate_any, read_any
 from gap_diagnosis.model.evidence import Evidence
-from gap_diagnosis.model.simulated_rig import Model, Simulator
+from gap_diagnosis.model.rig_model import Model
+from gap_diagnosis.model.simulated_rig import Simulator
 
 RIG = {
     "excitation": {"amplitudes_rad": [2e-3, 7e-3], "realizations": 4, "periods": 2, "seed": 3},

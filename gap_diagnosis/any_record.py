@@ -26,7 +26,7 @@ from .judgement import stopped
 from .model.discretisation import discretisation_error
 from .model.nominal import datasheet
 from .model.quasi_static import Stations, stations
-from .model.simulated_rig import Model
+from .model.rig_model import Model
 from .notes import NOT_HELD_OUT
 from .outcome.diagnosis import Diagnosis
 from .record_investigation import RecordInvestigation, investigate_records

@@ -18,19 +18,22 @@ from .gates.bags_gate import with_bags_gate
 from .gates.gate_checks import GateReport, check_gates
 from .judgement import judge, stopped
 from .model.misfit import Misfit
-from .model.simulated_rig import Model, Signals, Simulator
+from .model.rig_model import Model
+from .model.simulated_rig import Signals, Simulator
 from .outcome.diagnosis import Diagnosis
 from .outcome.verdict_words import ROUNDING
 from .where.residual_map import ResidualMap, residual_map
 from .where.residual_torque import ResidualTorque, residual_torque
-from .which.attribution import Attribution
+from .which.attribution import NOTHING_LEFT, Attribution
 from .which.catalogue import catalogue
 from .which.fits import Fitter
-from .which.rounding import smooth, widened, with_rounding
+from .which.rounding import coarse, in_the_loop, smooth, widened, with_rounding
 from .which.search import Search
 from .which.search_space import TOLERANCE
 
 Progress = Callable[[str], None]
+
+_ROUNDS = 3  # of simulating what rounding adds to the refit, and fitting it anew
 
 
 @dataclass(frozen=True)
@@ -116,27 +119,71 @@ def investigate(
     simulator.begin_near(model, std, train)
     step = position_step([r.position for r in recorded.realizations])
     seen = std if step is None else widened(std, step, recorded.experiment.samples_per_period)
-    fitter = Fitter(recorded, simulator, seen, model.plant, train, held, tolerance, effects)
+
+    def fitted_by(simulator: Simulator, std: np.ndarray) -> Fitter:
+        return Fitter(recorded, simulator, std, model.plant, train, held, tolerance, effects)
+
+    fitter, bare = fitted_by(simulator, seen), simulator
+    if step is not None and simulator.repeats and coarse(recorded, step):
+        progress("rounding in the loop")
+        simulator, fitter = _rounding_in_the_loop(simulator, fitter, fitted_by, step, std)
     attribution = Search(fitter, progress, until).run()
     if step is not None and (effects is None or ROUNDING in effects):
-        plain = Misfit(recorded, simulator, std, train), Misfit(recorded, simulator, std, held)
+        plain = Misfit(recorded, bare, std, train), Misfit(recorded, bare, std, held)
         attribution = with_rounding(attribution, plain, step)
     progress("judgement")
     gates = with_bags_gate(gates, recorded, noise, simulator, attribution.best.model)
     best = attribution.best
-    rounded = simulator.signals(best.model) if ROUNDING in best.effects else None
-    models = {
-        "nominal": model,
-        "refit": attribution.refit.model,
-        "explained": smooth(best.model) if len(best.effects) > 1 else best.model,
+    named = ROUNDING in best.effects  # then only the explanation holds what rounding adds
+    rounded = simulator.signals(best.model) if named else None
+    without, alone = (
+        (bare, Misfit(recorded, bare, std, held)) if named else (simulator, fitter.held)
+    )
+    explained = smooth(best.model) if len(best.effects) > 1 else best.model
+    signals = {
+        "nominal": without.signals(model),
+        "refit": without.signals(attribution.refit.model),
+        "explained": simulator.signals(explained),
     }
-    signals = {name: simulator.signals(each) for name, each in models.items()}
     maps = {name: residual_map(recorded, noise, *simulated) for name, simulated in signals.items()}
     diagnosis = judge(
         recorded, std, gates, fitter, attribution, signals, maps, held_out=held_out,
-        known_noise=noise is not None, rounded=rounded,
+        known_noise=noise is not None, nominal_misfit=alone.chi2(model), rounded=rounded,
     )  # fmt: skip
     return Investigation(recorded, model, gates, noise, held, signals, maps, attribution, diagnosis)
+
+
+def _rounding_in_the_loop(
+    simulator: Simulator,
+    fitter: Fitter,
+    fitted_by: Callable[[Simulator, np.ndarray], Fitter],
+    step: float,
+    std: np.ndarray,
+) -> tuple[Simulator, Fitter]:
+    """Return what simulates and fits a motion of few counts, if that comes nearer to the record.
+
+    What rounding adds is simulated with the refit, which is fitted anew beside it.
+
+    Args:
+        simulator: of models whose encoder does not round.
+        fitter: for which rounding is white noise.
+        fitted_by: makes a fitter that simulates by one, with such noise of the lines.
+        step: of the encoder, rad.
+        std: noise of the lines, see `NoiseLevels.of_outputs`.
+    """
+    refit = fitter.refit()
+    least, chosen = refit.held_chi2, (simulator, fitter)
+    for _ in range(_ROUNDS):
+        if least < NOTHING_LEFT * fitter.held.size:
+            break
+        rounded = in_the_loop(simulator, refit.model, step, std)
+        other = simulator.adding(rounded.added)
+        fitter = fitted_by(other, np.hypot(std, rounded.std))
+        refit = fitter.refit()
+        if not refit.held_chi2 < least:
+            break
+        least, chosen = refit.held_chi2, (other, fitter)
+    return chosen
 
 
 def _split(recorded: RecordedExperiment) -> tuple[tuple[int, ...], tuple[int, ...]]:

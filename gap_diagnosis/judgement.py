@@ -12,7 +12,7 @@ from fjr_records.periodic import RecordedExperiment
 from .gates.gate_checks import GateReport
 from .how_far.held_out_gap import held_out_gap
 from .how_far.steps import causes, evidence_kind, steps
-from .model.simulated_rig import Model, Signals
+from .model.simulated_rig import Signals
 from .next_experiment.choice import next_experiment
 from .notes import notes, rounding
 from .outcome.diagnosis import Candidate, Diagnosis, Figure, Gaps, NextExperiment, Verdict
@@ -40,6 +40,7 @@ def judge(
     *,
     held_out: bool,
     known_noise: bool,
+    nominal_misfit: float,
     rounded: Signals | None,
 ) -> Diagnosis:
     """Return the diagnosis of an experiment whose search has ended.
@@ -54,12 +55,14 @@ def judge(
         maps: residual map of each stage.
         held_out: whether the data that the fits are judged by are such that no fit has seen.
         known_noise: whether the noise was seen between periods.
+        nominal_misfit: of the held-out data per degree of freedom, by noise alone where the
+            rounding of the encoder is named.
         rounded: simulated with the rounding of the encoder where that is named; None elsewhere.
     """
     best, refit = attribution.best, attribution.refit
     held, size = fitter.held.which, fitter.held.size
     misfits = {
-        "nominal": fitter.held.chi2(Model(fitter.nominal, {})),
+        "nominal": nominal_misfit,
         "refit": refit.held_chi2 / size,
         "explained": best.held_chi2 / size,
     }

@@ -21,7 +21,7 @@ from .model.evidence import Evidence
 from .model.quasi_static import NOTE as QUASI_STATIC
 from .model.quasi_static import Stations
 from .model.record_length import within
-from .model.simulated_rig import Model
+from .model.rig_model import Model
 from .notes import at_limits
 from .outcome.diagnosis import Bags, Diagnosis
 from .outcome.verdict_words import OUT_OF_TIME

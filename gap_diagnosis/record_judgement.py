@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from .how_far.record_ledger import Ledger
 from .model.evidence import Evidence
-from .model.simulated_rig import Model
+from .model.rig_model import Model
 from .outcome.diagnosis import (
     Bags,
     Candidate,

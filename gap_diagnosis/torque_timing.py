@@ -13,7 +13,7 @@ from fjr_records.records import RecordSet
 
 from .model.evidence import Evidence
 from .model.record_torque import CONTINUOUS, with_continuous_torque
-from .model.simulated_rig import Model
+from .model.rig_model import Model
 from .which.cell_fits import CellFit, CellFitter
 from .which.gains import gain, stands_for
 

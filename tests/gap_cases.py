@@ -16,7 +16,8 @@ from fjr_records.noise import noise_levels
 from fjr_records.periodic import RecordedExperiment, RecordedRealization
 from fjr_sim_node.plant import PLANT
 from fjr_sim_node.simulation.simulator import SIMULATOR, run_realization
-from gap_diagnosis.model.simulated_rig import Model, Simulator
+from gap_diagnosis.model.rig_model import Model
+from gap_diagnosis.model.simulated_rig import Simulator
 from gap_diagnosis.which.fits import Fitter
 from gap_diagnosis.which.search_space import TOLERANCE
 
@@ -68,8 +69,12 @@ def simulate_case(
     grid: str = "odd_random",
     controller: Mapping[str, Any] | None = None,
     plant: Mapping[str, float] | None = None,
+    **played: float,
 ) -> Case:
-    """Simulate an experiment as the sealed cases are made, in memory."""
+    """Simulate an experiment as the sealed cases are made, in memory.
+
+    What is not named here, such as the highest frequency, is a parameter of the excitation.
+    """
     effects = dict(effects or {})
     rig = SIMULATOR.check(
         {
@@ -91,6 +96,7 @@ def simulate_case(
             "periods": periods,
             "transient_periods": transient_periods,
             "seed": seed + 1,
+            **played,
         }
     )
     law = dict(controller or {})

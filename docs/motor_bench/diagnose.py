@@ -15,7 +15,8 @@ import numpy as np
 from fjr_records.periodic import RecordedExperiment, RecordedRealization, read_experiment
 from fjr_records.spectra import line_spectrum
 from gap_diagnosis.model.misfit import Misfit
-from gap_diagnosis.model.simulated_rig import Model, Simulator
+from gap_diagnosis.model.rig_model import Model
+from gap_diagnosis.model.simulated_rig import Simulator
 from gap_diagnosis.which.fits import Fit, Fitter
 
 TOLERANCE = 2.3  # friction is not known at all: every value may be a factor of sixty off

@@ -16,7 +16,7 @@ from fjr_records.periodic import RecordedExperiment
 from gap_diagnosis.any_record import read_any
 from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.model.parts import Purpose
-from gap_diagnosis.model.simulated_rig import Model
+from gap_diagnosis.model.rig_model import Model
 from gap_diagnosis.outcome.diagnosis import (
     Cause,
     Diagnosis,

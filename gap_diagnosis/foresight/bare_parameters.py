@@ -12,7 +12,7 @@ from fjr_kit.errors import InputError
 from fjr_kit.showing import BareRefit
 from fjr_sim_node.plant import PLANT
 
-from ..model.simulated_rig import Model
+from ..model.rig_model import Model
 from ..which.scales import Scales
 from .foreseen import ForeseenParameter, Known
 

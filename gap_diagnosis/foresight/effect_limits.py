@@ -17,7 +17,7 @@ import numpy as np
 from fjr_kit.showing import BareRefit, size_showing
 from fjr_sim_node import effects as fx
 
-from ..model.simulated_rig import Model
+from ..model.rig_model import Model
 from ..outcome.verdict_words import ROUNDING
 from ..which.equivalents import SCALES
 from ..which.screening import by_shape

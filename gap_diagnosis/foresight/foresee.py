@@ -10,7 +10,7 @@ from fjr_sim_node import effects as fx
 
 from ..gates.gate_checks import check_gates
 from ..model.nominal import refuse_too_stiff
-from ..model.simulated_rig import Model
+from ..model.rig_model import Model
 from ..which.catalogue import catalogue
 from ..which.scales import Scales
 from ..which.search_space import TOLERANCE

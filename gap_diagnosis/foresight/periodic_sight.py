@@ -12,7 +12,8 @@ from fjr_records.noise import NoiseLevels, even_lines_as_noise
 from fjr_records.periodic import RecordedExperiment
 
 from ..model.misfit import Misfit
-from ..model.simulated_rig import Model, Simulator, too_stiff
+from ..model.rig_model import Model, too_stiff
+from ..model.simulated_rig import Simulator
 from ..which.attribution import CERTAIN, SMALL_GAIN
 from ..which.scales import Scales
 

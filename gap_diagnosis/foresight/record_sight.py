@@ -11,7 +11,7 @@ import numpy as np
 from fjr_records.records import RecordSet
 
 from ..model.evidence import Evidence
-from ..model.simulated_rig import Model
+from ..model.rig_model import Model
 from ..which.gains import LEAST_GAIN
 from ..which.scales import Scales
 from ..which.stepwise import NOTHING_LEFT

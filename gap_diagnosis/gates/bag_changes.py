@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import optimize, stats
 
-from ..model.simulated_rig import Model
+from ..model.rig_model import Model
 from .bag_deviations import BagBlocks, BagErrors, deviations
 
 TREND_FALSE_ALARM = 0.005

@@ -17,7 +17,8 @@ from fjr_records.spectra import line_spectrum
 from fjr_sim_node import effects as fx
 
 from ..model.evidence import Evidence
-from ..model.simulated_rig import Model, Simulator
+from ..model.rig_model import Model
+from ..model.simulated_rig import Simulator
 
 BagErrors = Callable[[Sequence[Model], int], np.ndarray]
 """Takes models and the index of a bag, returns their errors in it, float64 (models, errors), in

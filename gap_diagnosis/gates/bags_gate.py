@@ -9,7 +9,8 @@ from fjr_records.noise import NoiseLevels
 from fjr_records.periodic import RecordedExperiment
 
 from ..model.evidence import Evidence
-from ..model.simulated_rig import Model, Simulator
+from ..model.rig_model import Model
+from ..model.simulated_rig import Simulator
 from ..outcome.diagnosis import Bags, BagTrend, Estimate
 from .bag_changes import TREND_FALSE_ALARM, BagChanges, Trend, bag_changes
 from .bag_deviations import periodic_errors, record_errors

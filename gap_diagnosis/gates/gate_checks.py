@@ -18,7 +18,7 @@ from fjr_records.spectra import PeriodSums
 
 from ..model.controller_check import check_controller
 from ..model.discretisation import discretisation_error
-from ..model.simulated_rig import Model
+from ..model.rig_model import Model
 from ..outcome.diagnosis import Bags
 from .data_notes import data_notes
 from .stationarity import PERIOD_Z_LIMIT, period_drift

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from ..model.evidence import Evidence
-from ..model.simulated_rig import Model
+from ..model.rig_model import Model
 
 BINS = 40
 _LEAST = 5  # samples of a bin, below which it shows nothing

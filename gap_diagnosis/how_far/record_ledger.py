@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..model.evidence import Evidence
-from ..model.simulated_rig import Model
+from ..model.rig_model import Model
 from ..outcome.diagnosis import Figure, Gap, Place, Remainder, Stage, Step
 from ..where.remainder import looks_like
 

@@ -9,7 +9,7 @@ from fjr_kit.errors import InputError
 from fjr_records.periodic import RecordedExperiment
 from fjr_sim_node.simulation.closed_loop import simulate_law
 
-from .simulated_rig import Model
+from .rig_model import Model
 
 SUBSTEPS = 8
 """By how much the finer simulation divides each sample period, at least."""

@@ -22,7 +22,7 @@ from .lapped import lapped
 from .parts import Purpose, cut
 from .quasi_static import QuasiStaticSimulator, Stations
 from .record_rig import RecordSimulator
-from .simulated_rig import Model
+from .rig_model import Model
 
 WINDOWS = 24
 """Windows into which the shortest record is cut, at least; twice as many where a level has a single

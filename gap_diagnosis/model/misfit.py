@@ -16,7 +16,8 @@ import numpy as np
 from fjr_records.periodic import RecordedExperiment
 from fjr_records.spectra import line_spectrum
 
-from .simulated_rig import Model, Simulator
+from .rig_model import Model
+from .simulated_rig import Simulator
 
 MODEL_ERROR = 1e-3
 """Relative error of a line that is put down to the simulation, not to the rig."""

@@ -21,7 +21,8 @@ from fjr_sim_node import effects as fx
 from fjr_sim_node.plant import PLANT
 from fjr_sim_node.simulation.simulator import SIMULATOR
 
-from .simulated_rig import Model, Simulator, steps_a_sample
+from .rig_model import Model, steps_a_sample
+from .simulated_rig import Simulator
 
 PAPER = "paper"
 """Names the paper's values."""

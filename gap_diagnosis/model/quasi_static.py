@@ -21,7 +21,7 @@ from fjr_records.records import Record, RecordSet
 from fjr_sim_node.plant.statics import torque_along
 
 from .record_loop import RecordLoop
-from .simulated_rig import Model
+from .rig_model import Model
 
 NOTE = (
     "Of motion as slow as this only what acts at rest or in slow motion can be seen: friction, "

@@ -19,7 +19,8 @@ from fjr_sim_node.simulation.closed_loop import Trajectory, simulate_law
 
 from .prediction import CROSSOVER_SHARE, model_observer
 from .record_loop import RecordLoop, loop_of, without_erratic, without_swinging
-from .simulated_rig import Model, run_parallel, too_stiff
+from .rig_model import Model, too_stiff
+from .simulated_rig import run_parallel
 
 _SMALL = 1e-4  # relative: a change of an inertia that must not grow
 _AT_REST = 5.0  # standard deviations of noise that a record at rest may begin away from zero

@@ -1,12 +1,11 @@
-"""The simulated rig as a model with free parameters: bare plant times a few effects."""
+"""Steady periods repeated by a model: in the loop that was recorded, or as a prediction."""
 
 from __future__ import annotations
 
-import math
+import copy
 import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any, TypeVar
 
@@ -16,83 +15,21 @@ from controller_node.law import law_of
 from fjr_kit.errors import InputError
 from fjr_records.noise import NoiseLevels, noise_levels
 from fjr_records.periodic import RecordedExperiment, RecordedRealization
-from fjr_sim_node import effects as fx
-from fjr_sim_node import plant
 from fjr_sim_node.simulation import rig
 from fjr_sim_node.simulation.closed_loop import State, Trajectory, simulate, simulate_law
 
 from . import prediction
+from .rig_model import Model, too_stiff
 
 Signals = tuple[np.ndarray, np.ndarray]
 """One steady period of y (rad) and of u (N m) of every realization, float64 (n, N) each."""
 
-_MOST_STEPS, _MOST_STEPS_A_SAMPLE = 1e6, 20.0  # of the integration of one run
 _SETTLED = (1e-6, 1e-4)
 """Least and greatest part of the rms position that is left of a transient; between them the median
 standard deviation of a line, for a tail that lies in one line must not count there."""
 _SLOWER = 1.5  # times as long as it took the model that is simulated first
 _Result = TypeVar("_Result")
 _POOL = ThreadPoolExecutor(len(os.sched_getaffinity(0)))
-
-
-@dataclass(frozen=True)
-class Model:
-    """A plant with effects; immutable.
-
-    Attributes:
-        plant: the bare parameters by name (PLANT).
-        effects: parameters of effects by full name (`effect.parameter`); missing ones are off.
-    """
-
-    plant: Mapping[str, float]
-    effects: Mapping[str, float]
-
-    @classmethod
-    def nominal(cls, values: Mapping[str, Any]) -> Model:
-        """Return the bare model with checked PLANT values.
-
-        An infinite stiffness k0 means a rigid axis: motor and link are one body, of which only the
-        sums of inertia and friction count.
-        """
-        sums = plant.rigid_sums(values)
-        if sums is not None:
-            return cls(sums, {})
-        return cls({name: float(values[name]) for name in plant.PLANT.names}, {})
-
-    @property
-    def rigid(self) -> bool:
-        """Whether there is no flexible transmission."""
-        return "k0" not in self.plant
-
-    def with_effects(self, effects: Mapping[str, float]) -> Model:
-        """Return the model with further effect parameters set."""
-        return replace(self, effects={**self.effects, **effects})
-
-    @property
-    def settles_slowly(self) -> bool:
-        """Whether an effect remembers what may be longer past than the rig takes to settle."""
-        return any(fx.EFFECTS[name.split(".")[0]].settles_slowly for name in self.effects)
-
-    @property
-    def whole_plant(self) -> dict[str, float]:
-        """All bare parameters by the names of PLANT, those of a rigid axis as well."""
-        none = dict.fromkeys(plant.PLANT.names, 0.0)
-        return {**none, "k0": math.inf, **self.plant}
-
-    @property
-    def plant_coefficients(self) -> tuple[float, ...]:
-        """Bare parameters as the compiled plant takes them."""
-        return plant.coefficients({**self.whole_plant, **self.effects})
-
-    @property
-    def one_body(self) -> bool:
-        """Whether motor and link move as one."""
-        return plant.moves_as_one({"k0": math.inf, **self.plant, **self.effects})
-
-    @property
-    def effect_coefficients(self) -> np.ndarray | None:
-        """Effects as the compiled plant takes them; None if all are off."""
-        return fx.coefficients(self.effects)
 
 
 def run_parallel(run: Callable[[Any], _Result], jobs: Sequence[Any]) -> list[_Result]:
@@ -104,37 +41,6 @@ def last_samples(model: Model, run: Trajectory, samples: int) -> np.ndarray:
     """Return y, u and q at the end of a model's run, float64 (3, samples); of one body, q is th."""
     link = run.motor if model.one_body else run.link
     return np.array([signal[-samples:] for signal in (run.position, run.torque, link)])
-
-
-def steps_a_sample(
-    model: Model, sample_rate_hz: float, speed: float = 0.0, torque: float = 0.0
-) -> float:
-    """Return how many steps the integration of a sample takes.
-
-    Args:
-        model: the model.
-        sample_rate_hz: rate of the samples.
-        speed: of the motor (rad/s).
-        torque: motor torque (N m).
-    """
-    p, e = model.plant_coefficients, model.effect_coefficients
-    return plant.steps_per_second(speed, torque, p, e) / sample_rate_hz
-
-
-def too_stiff(
-    model: Model, samples: int, sample_rate_hz: float, speed: float, torque: float
-) -> bool:
-    """Tell whether a model would take so long to play as no record can call for.
-
-    Args:
-        model: the model.
-        samples: of the run.
-        sample_rate_hz: their rate.
-        speed: rms speed of the motor (rad/s).
-        torque: greatest torque (N m).
-    """
-    steps = samples * steps_a_sample(model, sample_rate_hz, speed, torque)
-    return steps > max(_MOST_STEPS, _MOST_STEPS_A_SAMPLE * samples)
 
 
 class Simulator:
@@ -169,6 +75,17 @@ class Simulator:
         ]
         self._torques = [float(np.abs(r.torque).max()) for r in recorded.realizations]
         self._begins: dict[int, tuple[int, State]] = {}
+        self._added: np.ndarray | None = None
+
+    def adding(self, signals: np.ndarray) -> Simulator:
+        """Return a simulator that adds signals to y, u and q of models whose encoder is smooth.
+
+        Args:
+            signals: what rounding adds on the average, float64 (realizations, 3, N).
+        """
+        other = copy.copy(self)
+        other._added = signals
+        return other
 
     @property
     def samples(self) -> int:
@@ -238,6 +155,23 @@ class Simulator:
         run = self._run([model], which)[0]
         return run[:, 0], run[:, 1], run[:, 2]
 
+    def disturbed(self, model: Model, index: int, noise: np.ndarray) -> np.ndarray:
+        """Return one steady period of y, u and q from rest with noise of the encoder.
+
+        Args:
+            model: the model.
+            index: of the realization, whose loop is known.
+            noise: (samples,), rad.
+
+        Returns:
+            float64 (3, N); NaN where the motion diverges.
+        """
+        try:
+            run = self._simulated(model, self._inputs[index], self._elapsed[index], noise=noise)
+        except InputError:
+            return np.full((3, self._samples), np.nan)
+        return last_samples(model, run, self._samples)
+
     def noise(self, model: Model) -> NoiseLevels | None:
         """Return the noise of what is compared: of the signals, or of their prediction errors.
 
@@ -281,7 +215,8 @@ class Simulator:
             run = self._simulated(model, inputs, self._elapsed[index], begin)
         except InputError:
             return np.full((3, self._samples), np.nan)
-        return last_samples(model, run, self._samples)
+        out = last_samples(model, run, self._samples)
+        return out if self._added is None or model.rounds else out + self._added[index]
 
     def _stiff(self, model: Model, index: int) -> bool:
         speed, torque = self._speeds[index], self._torques[index]
@@ -293,11 +228,14 @@ class Simulator:
         inputs: tuple[np.ndarray, ...],
         elapsed_s: float,
         begin: State | None = None,
+        noise: np.ndarray | None = None,
     ) -> Trajectory:
         p, e = model.plant_coefficients, model.effect_coefficients
         if self.repeats:
             (reference,) = inputs
-            return simulate(reference, self.sample_rate_hz, p, self._law, None, e, elapsed_s, begin)
+            return simulate(
+                reference, self.sample_rate_hz, p, self._law, noise, e, elapsed_s, begin
+            )
         position, torque = inputs
         speed = (position[1] - position[0]) * self.sample_rate_hz
         return simulate_law(

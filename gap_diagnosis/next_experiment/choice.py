@@ -23,7 +23,8 @@ from fjr_records.spectra import line_spectrum
 from fjr_sim_node.simulation.closed_loop import simulate
 
 from ..model.misfit import MODEL_ERROR
-from ..model.simulated_rig import Model, last_samples, run_parallel
+from ..model.rig_model import Model
+from ..model.simulated_rig import last_samples, run_parallel
 from ..outcome.diagnosis import NextExperiment
 from ..which.fits import Fit
 from .trials import Trial, trials

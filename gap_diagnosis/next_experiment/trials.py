@@ -12,7 +12,7 @@ import numpy as np
 from excitation_node.multisine import one_period
 from fjr_records.periodic import RecordedExperiment
 
-from ..model.simulated_rig import Model
+from ..model.rig_model import Model
 
 SETUP_S = 600.0
 """Time that a change of the rig's mechanics costs."""

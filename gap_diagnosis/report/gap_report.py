@@ -13,7 +13,7 @@ from fjr_kit.page import render_page
 from ..how_far.comparison import LevelComparison, compare
 from ..investigation import Investigation
 from ..model.misfit import MODEL_ERROR
-from ..model.simulated_rig import Model
+from ..model.rig_model import Model
 from ..outcome.verdict_words import HELD_OUT
 from .gap_level_plots import level_plots
 from .gap_plots import ranking_plot, sigma_plot, torque_plot, where_plot

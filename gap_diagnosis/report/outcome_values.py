@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from ..model.simulated_rig import Model
+from ..model.rig_model import Model
 from ..outcome.cause_words import evidence_sentences, remainder_sentences
 from ..outcome.diagnosis import Diagnosis
 from ..outcome.verdict_words import HELD_OUT, WORDS, action, closed, headline, meaning, summaries

@@ -8,7 +8,7 @@ from typing import Any
 from fjr_kit.page import render_page
 
 from ..how_far.record_comparison import RecordComparison, compare_records
-from ..model.simulated_rig import Model
+from ..model.rig_model import Model
 from ..outcome.cause_words import TORQUE
 from ..record_investigation import RecordInvestigation
 from .gap_tables import parameters, tried

@@ -28,7 +28,7 @@ from fjr_sim_node.plant.spring import transmitted_torque
 from fjr_sim_node.plant.torques import gear_load, motor_drive, motor_level, motor_viscous
 from fjr_sim_node.simulation.rig import at_rest, driven
 
-from ..model.simulated_rig import Model
+from ..model.rig_model import Model
 
 OVERSAMPLING = 4
 """Points per sample at which the motor drives the link, along straight lines between them."""

@@ -19,7 +19,7 @@ import numpy as np
 from fjr_sim_node import effects as fx
 
 from ..model.evidence import Evidence
-from ..model.simulated_rig import Model
+from ..model.rig_model import Model
 from .cell_weights import CellWeights
 from .from_parts import from_part
 from .least_squares import Solution, solve

@@ -12,7 +12,8 @@ from fjr_records.periodic import RecordedExperiment
 from fjr_sim_node import effects as fx
 
 from ..model.misfit import Misfit
-from ..model.simulated_rig import Model, Simulator
+from ..model.rig_model import Model
+from ..model.simulated_rig import Simulator
 from .catalogue import catalogue
 from .from_parts import from_part
 from .least_squares import Solution, solve

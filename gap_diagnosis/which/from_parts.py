@@ -12,7 +12,7 @@ import numpy as np
 
 from fjr_sim_node import effects as fx
 
-from ..model.simulated_rig import Model
+from ..model.rig_model import Model
 from .screening import Costs, Errors, Proposal
 from .search_space import Space
 

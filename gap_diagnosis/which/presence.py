@@ -16,7 +16,7 @@ from scipy import stats
 
 from fjr_sim_node import effects as fx
 
-from ..model.simulated_rig import Model
+from ..model.rig_model import Model
 from ..outcome.diagnosis import Estimate
 from .cell_fits import CellFit, CellFitter
 from .estimates import (

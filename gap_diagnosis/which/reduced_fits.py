@@ -8,7 +8,7 @@ import numpy as np
 
 from fjr_sim_node import effects as fx
 
-from ..model.simulated_rig import Model
+from ..model.rig_model import Model
 from .fits import MORE_STEPS, Fit, Fitter
 from .least_squares import Solution
 

@@ -21,7 +21,8 @@ from fjr_records.spectra import line_spectrum
 from fjr_sim_node import effects as fx
 
 from ..model.misfit import Misfit
-from ..model.simulated_rig import Model, Simulator
+from ..model.rig_model import Model
+from ..model.simulated_rig import Simulator
 from .least_squares import Solution
 
 

@@ -17,7 +17,7 @@ from fjr_sim_node import effects as fx
 from fjr_sim_node.theory.linear import g0
 
 from ..model.evidence import Evidence
-from ..model.simulated_rig import Model
+from ..model.rig_model import Model
 from .least_squares import Solution
 from .ripples import of_pair, waves
 

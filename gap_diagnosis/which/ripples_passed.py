@@ -10,7 +10,7 @@ import math
 
 from fjr_sim_node import effects as fx
 
-from ..model.simulated_rig import Model
+from ..model.rig_model import Model
 from .scales import Scales
 
 LEAST_PASSED = 0.75

@@ -5,19 +5,34 @@ rounding decides chaotically which count comes next: it repeats with the periods
 scatter does not show it, but no simulation meets it sample by sample. So it widens the variance of
 the lines, step^2/12 a sample, and is named where the refit, or the effects beside it, leave nothing
 but that.
+
+A motion that takes many samples for a count has errors that are no white noise: they go with the
+motion, and move it in the mean by several times as much. Simulations that round, each with noise of
+its own, show both.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
+
+from fjr_records.periodic import RecordedExperiment
+from fjr_records.spectra import line_spectrum
 
 from ..model.misfit import Misfit
-from ..model.simulated_rig import Model
+from ..model.rig_model import Model
+from ..model.simulated_rig import Simulator, run_parallel
 from ..outcome.verdict_words import ROUNDING
 from .attribution import CERTAIN, PLAIN, SECOND_GAIN, SMALL_GAIN, Attribution
 from .fits import Fit
+
+_FEW_COUNTS = 30.0
+"""Of the rms motion: rounding that is finer acts as white noise."""
+_SIMULATED = 8  # simulations of each realization that round
+_ALIKE = 9  # neighbouring lines that rounding scatters alike
+_DITHER = 0.05  # of a step: noise that makes the simulations take other counts
 
 
 def widened(noise_std: np.ndarray, step: float, samples: int) -> np.ndarray:
@@ -27,6 +42,51 @@ def widened(noise_std: np.ndarray, step: float, samples: int) -> np.ndarray:
     rounding[0] *= 0.5
     out[:, 0] = np.hypot(out[:, 0], rounding)
     return out
+
+
+@dataclass(frozen=True)
+class Rounded:
+    """What rounding does to the motion of a model in its loop.
+
+    Attributes:
+        added: on the average, to y, u and q, float64 (realizations, 3, N).
+        std: how far it scatters about that average, by the lines of the outputs as
+            `NoiseLevels.of_outputs`, (realizations, outputs, lines), rad.
+    """
+
+    added: np.ndarray
+    std: np.ndarray
+
+
+def coarse(recorded: RecordedExperiment, step: float) -> bool:
+    """Tell whether a motion is of so few counts that its rounding may be no white noise."""
+    return min(float(np.std(r.position)) for r in recorded.realizations) < _FEW_COUNTS * step
+
+
+def in_the_loop(
+    simulator: Simulator, model: Model, step: float, noise_std: np.ndarray, seed: int = 0
+) -> Rounded:
+    """Return what rounding does to the motion of a model whose encoder does not round.
+
+    Args:
+        simulator: of a loop that is known.
+        model: the model.
+        step: of the encoder, rad.
+        noise_std: `NoiseLevels.of_outputs`, (realizations, outputs, lines), rad.
+        seed: of the noise of each simulation.
+    """
+    rng = np.random.default_rng(seed)
+    rounds = model.with_effects({f"{ROUNDING}.resolution_rad": step})
+    outputs, lines = noise_std.shape[1:]
+    shape = len(noise_std), _SIMULATED, simulator.samples
+    noise = rng.normal(0.0, _DITHER * step, shape)
+    jobs = [(i, k) for i in range(shape[0]) for k in range(_SIMULATED)]
+    runs = run_parallel(lambda job: simulator.disturbed(rounds, job[0], noise[job]), jobs)
+    signals = np.array(runs).reshape(*shape[:2], *runs[0].shape)
+    spectra = line_spectrum(signals[:, :, [0, 2][:outputs]], lines)
+    scatter = uniform_filter1d(np.var(spectra, axis=1, ddof=1), _ALIKE, mode="nearest")
+    smooth = np.stack(simulator.motion(model, range(shape[0])), axis=1)
+    return Rounded(signals.mean(axis=1) - smooth, np.sqrt((1.0 + 1.0 / _SIMULATED) * scatter))
 
 
 def with_rounding(

@@ -17,7 +17,7 @@ import numpy as np
 
 from fjr_sim_node import effects as fx
 
-from ..model.simulated_rig import Model
+from ..model.rig_model import Model
 from .least_squares import Solution
 from .search_space import Space, beside
 

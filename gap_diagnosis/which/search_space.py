@@ -14,7 +14,7 @@ import numpy as np
 
 from fjr_sim_node import effects as fx
 
-from ..model.simulated_rig import Model
+from ..model.rig_model import Model
 from .scales import Scales
 
 TOLERANCE = 0.1

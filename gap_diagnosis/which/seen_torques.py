@@ -16,7 +16,7 @@ import numpy as np
 from fjr_sim_node import effects as fx
 
 from ..model.evidence import Evidence
-from ..model.simulated_rig import Model
+from ..model.rig_model import Model
 
 LOADS = ("torque_bias", "gravity", "external_spring")
 """Effects whose torque does not depend on the motion but for the angle."""

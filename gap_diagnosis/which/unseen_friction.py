@@ -15,7 +15,7 @@ import numpy as np
 
 from fjr_sim_node import effects as fx
 
-from ..model.simulated_rig import Model
+from ..model.rig_model import Model
 
 SCATTER = 0.03
 """Standard deviation of friction from run to run where the runs cannot show it, relative: that of

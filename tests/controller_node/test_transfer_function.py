@@ -20,7 +20,8 @@ from fjr_sim_node import effects, plant
 from fjr_sim_node.simulation import closed_loop
 from gap_diagnosis.model.controller_check import check_controller
 from gap_diagnosis.model.discretisation import discretisation_error
-from gap_diagnosis.model.simulated_rig import Model, Simulator
+from gap_diagnosis.model.rig_model import Model
+from gap_diagnosis.model.simulated_rig import Simulator
 
 PD = pd_filtered.coefficients(pd_filtered.CONTROLLER.defaults())
 LEAD_WITH_INTEGRATOR = {

@@ -126,7 +126,8 @@ from fjr_interface.parameter_file import load_parameter_file
 from fjr_bringup.campaign.plan import Campaign
 from fjr_records.noise import noise_levels
 from fjr_records.periodic import RecordedExperiment, RecordedRealization
-from gap_diagnosis.model.simulated_rig import Model, Simulator
+from gap_diagnosis.model.rig_model import Model
+from gap_diagnosis.model.simulated_rig import Simulator
 from gap_diagnosis.outcome.verdict_words import explanation, unit_of
 from gap_diagnosis.which.fits import Fitter
 

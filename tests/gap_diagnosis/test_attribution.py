@@ -10,7 +10,8 @@ from gap_cases import SHORT, fitter_of, simulate_case, true_parameters
 
 from fjr_records.noise import noise_levels
 from fjr_sim_node.plant import PLANT
-from gap_diagnosis.model.simulated_rig import Model, Simulator
+from gap_diagnosis.model.rig_model import Model
+from gap_diagnosis.model.simulated_rig import Simulator
 from gap_diagnosis.notes import unexplained
 from gap_diagnosis.which import ranking
 from gap_diagnosis.which.attribution import STANDS_OUT, Attribution, stands_out

@@ -10,7 +10,8 @@ from fjr_records.noise import noise_levels
 from fjr_records.spectra import line_spectrum
 from fjr_sim_node import effects as fx
 from fjr_sim_node.plant import PLANT
-from gap_diagnosis.model.simulated_rig import Model, Simulator
+from gap_diagnosis.model.rig_model import Model
+from gap_diagnosis.model.simulated_rig import Simulator
 
 EFFECTS = {
     "backlash": {"backlash.half_gap_rad": 1e-3},

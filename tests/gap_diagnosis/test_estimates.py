@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from gap_cases import SHORT, fitter_of, simulate_case
 
-from gap_diagnosis.model.simulated_rig import Model
+from gap_diagnosis.model.rig_model import Model
 from gap_diagnosis.outcome.cause_words import digits, percent
 from gap_diagnosis.outcome.diagnosis import Estimate
 from gap_diagnosis.which.estimates import estimates, standard_errors, sure

@@ -25,7 +25,8 @@ from gap_diagnosis.how_far.held_out_gap import held_out_gap
 from gap_diagnosis.how_far.steps import steps
 from gap_diagnosis.investigation import Investigation, investigate
 from gap_diagnosis.model.misfit import Misfit
-from gap_diagnosis.model.simulated_rig import Model, Simulator
+from gap_diagnosis.model.rig_model import Model
+from gap_diagnosis.model.simulated_rig import Simulator
 from gap_diagnosis.outcome.diagnosis import (
     Cause,
     Diagnosis,

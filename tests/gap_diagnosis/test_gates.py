@@ -17,7 +17,8 @@ from gap_diagnosis.gates.stationarity import PERIOD_Z_LIMIT, period_drift
 from gap_diagnosis.model import discretisation
 from gap_diagnosis.model.controller_check import check_controller
 from gap_diagnosis.model.discretisation import discretisation_error
-from gap_diagnosis.model.simulated_rig import Model, Simulator
+from gap_diagnosis.model.rig_model import Model
+from gap_diagnosis.model.simulated_rig import Simulator
 
 NOMINAL = Model.nominal(PLANT.defaults())
 

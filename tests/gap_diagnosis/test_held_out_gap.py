@@ -8,7 +8,8 @@ from gap_cases import simulate_case
 
 from fjr_sim_node.plant import PLANT
 from gap_diagnosis.how_far.held_out_gap import STAGES, held_out_gap
-from gap_diagnosis.model.simulated_rig import Model, Simulator
+from gap_diagnosis.model.rig_model import Model
+from gap_diagnosis.model.simulated_rig import Simulator
 
 GAP = {"backlash.half_gap_rad": 1.5e-3}
 SHORT = {"base_frequency_hz": 0.5, "transient_periods": 2, "levels_rad": (3e-3, 1e-2)}

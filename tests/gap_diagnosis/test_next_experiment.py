@@ -12,7 +12,8 @@ from fjr_records.periodic import RecordedExperiment, RecordedRealization
 from fjr_sim_node import effects, plant
 from fjr_sim_node.plant import PLANT
 from fjr_sim_node.simulation.closed_loop import simulate
-from gap_diagnosis.model.simulated_rig import Model, Simulator
+from gap_diagnosis.model.rig_model import Model
+from gap_diagnosis.model.simulated_rig import Simulator
 from gap_diagnosis.next_experiment.choice import LEAST_SIGMA, next_experiment
 from gap_diagnosis.next_experiment.trials import Trial, trials
 from gap_diagnosis.which.fits import Fitter

@@ -11,7 +11,7 @@ from fjr_interface.parameter_file import save_parameter_file
 from fjr_kit.errors import InputError
 from fjr_sim_node.plant import PLANT
 from gap_diagnosis.model.nominal import UNITS, read_nominal, refuse_wrong_units
-from gap_diagnosis.model.simulated_rig import Model
+from gap_diagnosis.model.rig_model import Model
 
 PAPER = PLANT.defaults()
 

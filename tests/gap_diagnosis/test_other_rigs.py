@@ -18,7 +18,8 @@ from gap_diagnosis.gates.bags_gate import bags_gate
 from gap_diagnosis.gates.gate_checks import check_gates
 from gap_diagnosis.model.misfit import Misfit
 from gap_diagnosis.model.prediction import crossover_hz, lead, observer
-from gap_diagnosis.model.simulated_rig import Model, Simulator
+from gap_diagnosis.model.rig_model import Model
+from gap_diagnosis.model.simulated_rig import Simulator
 from gap_diagnosis.report.updated_parameters import simulator_values
 from gap_diagnosis.which.catalogue import catalogue
 from gap_diagnosis.which.fits import Fitter

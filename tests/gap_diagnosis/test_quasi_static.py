@@ -17,7 +17,7 @@ from fjr_sim_node.simulation.closed_loop import simulate
 from gap_diagnosis.any_record import investigate_any
 from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.model.quasi_static import stations
-from gap_diagnosis.model.simulated_rig import Model
+from gap_diagnosis.model.rig_model import Model
 from gap_diagnosis.record_investigation import LOST, RecordInvestigation, investigate_records
 from gap_diagnosis.report.gap_output import write_diagnosis
 

@@ -15,7 +15,7 @@ from fjr_sim_node import plant
 from fjr_sim_node.simulation import closed_loop
 from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.model.record_loop import loop_of
-from gap_diagnosis.model.simulated_rig import Model
+from gap_diagnosis.model.rig_model import Model
 
 RATE = 500.0
 NOMINAL = {name: float(value) for name, value in plant.PLANT.defaults().items()}

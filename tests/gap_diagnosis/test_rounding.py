@@ -16,8 +16,10 @@ from fjr_records.realization import unsettled
 from fjr_sim_node.plant import PLANT
 from gap_diagnosis.investigation import investigate
 from gap_diagnosis.model.misfit import Misfit
-from gap_diagnosis.model.simulated_rig import Model, Simulator
+from gap_diagnosis.model.rig_model import Model
+from gap_diagnosis.model.simulated_rig import Simulator
 from gap_diagnosis.outcome.verdict_words import ROUNDING
+from gap_diagnosis.which import rounding
 from gap_diagnosis.which.attribution import Attribution
 from gap_diagnosis.which.fits import Fitter
 from gap_diagnosis.which.rounding import widened, with_rounding
@@ -108,6 +110,43 @@ def test_the_coarse_encoder_is_named_beside_another_cause():
     assert "the refit with delay leaves" in said
     alone = investigate(recorded, nominal, effects=few).diagnosis
     assert alone.effects == ["delay"]
+
+
+FEW_COUNTS = 0.5e-2
+"""A step of which the motion of the lowest level is three counts, of many samples each."""
+
+
+@pytest.fixture(scope="module")
+def few_counts():
+    slow = {**SHORT, "levels_rad": (1.5e-2, 5e-2), "f_max_hz": 10.0, "sample_rate_hz": 4000.0}
+    return simulate_case({f"{ROUNDING}.resolution_rad": FEW_COUNTS}, seed=5, **slow)
+
+
+def test_rounding_moves_a_motion_of_few_counts_in_the_mean_as_simulated(few_counts, coarse):
+    assert rounding.coarse(few_counts.recorded, FEW_COUNTS)
+    assert not rounding.coarse(coarse.recorded, STEP / 10.0)
+    recorded, simulator = few_counts.recorded, Simulator(few_counts.recorded)
+    std = noise_levels(recorded).of_outputs(recorded)
+    samples = recorded.experiment.samples_per_period
+    true = few_counts.bare
+    found = rounding.in_the_loop(simulator, true, FEW_COUNTS, std)
+    every = range(len(recorded.realizations))
+    white = Misfit(recorded, simulator, widened(std, FEW_COUNTS, samples), every)
+    moved = Misfit(recorded, simulator.adding(found.added), np.hypot(std, found.std), every)
+    assert white.chi2(true) > 10.0
+    assert 0.2 < moved.chi2(true) < 4.0
+
+
+def test_a_coarse_encoder_under_few_counts_is_named_and_the_parameters_are_right(few_counts):
+    nominal = Model.nominal(PLANT.defaults()).plant
+    effects = [ROUNDING, "torque_bias", "cogging", "presliding_friction"]
+    found = investigate(few_counts.recorded, nominal, effects=effects).diagnosis
+    assert found.verdict == "effect" and found.effects == [ROUNDING]
+    steps = [step.chi2_per_dof for step in found.steps]
+    assert steps[1] > 5.0 * steps[2] and steps[2] < 2.0
+    for name in ("jm", "j", "k0"):
+        true = few_counts.truth.plant[name]
+        assert found.parameters[name].value == pytest.approx(true, rel=0.03)
 
 
 def test_a_fine_encoder_is_not_named():

@@ -19,7 +19,7 @@ from fjr_sim_node.simulation.closed_loop import simulate
 from gap_diagnosis.gates.bag_deviations import deviations, record_errors
 from gap_diagnosis.gates.bags_gate import as_bags, drift_of_runs, record_changes, scattering
 from gap_diagnosis.model.evidence import Evidence
-from gap_diagnosis.model.simulated_rig import Model
+from gap_diagnosis.model.rig_model import Model
 from gap_diagnosis.outcome.diagnosis import Bags, Estimate
 from gap_diagnosis.report.randomisation import randomisation_yaml, ranges
 from gap_diagnosis.which.cell_fits import CellFit

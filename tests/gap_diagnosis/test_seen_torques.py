@@ -7,7 +7,7 @@ import pytest
 from test_evidence import NOMINAL, records
 
 from gap_diagnosis.model.evidence import Evidence
-from gap_diagnosis.model.simulated_rig import Model
+from gap_diagnosis.model.rig_model import Model
 from gap_diagnosis.which.cell_fits import CellFitter
 from gap_diagnosis.which.seen_torques import SeenTorques, _best
 

@@ -9,7 +9,8 @@ from test_evidence import NOMINAL, records
 
 from fjr_sim_node.effects import EFFECTS
 from gap_diagnosis.model.evidence import Evidence
-from gap_diagnosis.model.simulated_rig import Model, Simulator
+from gap_diagnosis.model.rig_model import Model
+from gap_diagnosis.model.simulated_rig import Simulator
 from gap_diagnosis.which.cell_fits import CellFitter
 from gap_diagnosis.which.fits import Fit
 

@@ -10,7 +10,7 @@ from test_evidence import NOMINAL, RATE, records
 
 from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.model.record_loop import SWINGS, accounted_for
-from gap_diagnosis.model.simulated_rig import Model
+from gap_diagnosis.model.rig_model import Model
 from gap_diagnosis.record_investigation import investigate_records
 
 DELAY_S = 6e-3

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from test_evidence import NOMINAL, records
 
 from gap_diagnosis.model.evidence import Evidence
-from gap_diagnosis.model.simulated_rig import Model
+from gap_diagnosis.model.rig_model import Model
 from gap_diagnosis.which.cell_fits import CellFitter
 from gap_diagnosis.which.gains import gain
 from gap_diagnosis.which.unseen_friction import SCATTER, beside_scatter, deviated
