@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from dataclasses import replace
 
 import pytest
@@ -127,3 +128,20 @@ def test_several_sizes_are_known_together_where_none_is_alone(fall, there):
     names = ("quadratic_friction.motor_nm_s2_rad2", "quadratic_friction.link_nm_s2_rad2")
     blurred = {name: Estimate(value=1.0, low=-1.0, high=3.0) for name in names}
     assert beyond_zero("quadratic_friction", blurred, fall) == there
+
+
+@pytest.mark.parametrize(
+    ("motion", "over_noise", "share"),
+    [(0.2, 0.9, 1.0), (0.9, 0.2, 1.0), (0.4, 0.9, 0.8), (0.9, 0.6, 0.6), (0.6, math.nan, 0.6)],
+)
+def test_a_cause_is_doubtful_where_most_of_the_error_is_left_however_it_is_counted(
+    searched, motion, over_noise, share
+):
+    fitter, fits = searched
+    sure = max(causes_with_tests(fitter, fits[3], fits[0], SCATTER), key=lambda t: t.present)
+    assert sure.left < 0.1 and sure.over_noise < 0.1
+    closes = replace(
+        sure, share=sure.share.model_copy(update={"value": 0.5}), left=0.0, over_noise=0.0
+    )
+    beside = replace(closes, left=motion, over_noise=over_noise)
+    assert beside.present == pytest.approx(share * closes.present, rel=0.02)
