@@ -16,7 +16,7 @@ from fjr_records.importers.import_map import parse_map
 from fjr_records.importers.importer import ImportOptions, import_files
 from gap_diagnosis.any_record import diagnose
 
-RATE, SECONDS, SUBSTEPS = 500, 30, 10
+RATE, SECONDS, SUBSTEPS = 500, 20, 10
 KT, OHM, INERTIA = 0.042, 8.4, 3.0e-4
 GRAVITY, COULOMB, VISCOUS = 0.0188, 1.2e-3, 1.5e-5
 COUNTS = 2048
