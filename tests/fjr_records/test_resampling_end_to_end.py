@@ -92,6 +92,14 @@ def recorded(request, original, tmp_path_factory) -> Path:
     return folder
 
 
+@pytest.fixture(scope="module")
+def analyzed(recorded, tmp_path_factory) -> tuple[Path, str]:
+    """Analyze what was recorded by the command; return its folder and what it said."""
+    out = tmp_path_factory.mktemp("analysis")
+    maps = [part for one in MAP for part in ("--map", one)]
+    return out, run("analyze", recorded, "--resample", "auto", *maps, "--out", out)
+
+
 def only_level(folder: Path, **options) -> LevelResult:
     (level,) = analyze(folder, **options).levels
     assert level.bla is not None
@@ -105,8 +113,8 @@ def stated_errors(result: Result) -> dict[str, float]:
     return {match[1]: float(match[2]) for match in found}
 
 
-def test_the_bla_agrees_within_the_stated_error(original, recorded):
-    result = analyze(recorded, signal_map=SignalMap.parse(MAP), resampling=Resampling())
+def test_the_bla_agrees_within_the_stated_error(original, analyzed):
+    result = Result.read(analyzed[0] / "result.json")
     stated = stated_errors(result)
     assert stated.keys() == {"reference", "torque", "position"}
     same = Override(transient_periods=result.transient_periods, periods=result.periods)
@@ -130,11 +138,10 @@ def test_without_resampling_the_bags_are_refused(recorded):
         analyze(recorded, signal_map=SignalMap.parse(MAP))
 
 
-def test_the_command_says_what_it_did(recorded, tmp_path):
-    maps = [part for one in MAP for part in ("--map", one)]
-    said = run("analyze", recorded, "--resample", "auto", *maps, "--out", tmp_path / "analysis")
+def test_the_command_says_what_it_did(analyzed):
+    out, said = analyzed
     assert "Note: position was resampled from /joint_states (1000" in said.replace("\n", " ")
-    page = (tmp_path / "analysis" / "report.html").read_text()
+    page = (out / "report.html").read_text()
     assert "was resampled from /command" in page
 
 
