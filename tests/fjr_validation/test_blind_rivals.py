@@ -26,7 +26,7 @@ from fjr_validation.blind.outcome import Outcome
 from fjr_validation.blind.pace import pace
 from fjr_validation.blind.rivals import held_out, side_by_side, wilson
 
-RATE, SECONDS = 500.0, 3.0
+RATE, SECONDS = 500.0, 1.5
 RIGID = {"jm": 0.02, "j": 0.03, "fs": 0.1, "fsm": 0.1, "fv": 0.1, "fvm": 0.1,
          "k0": float("inf"), "k1": 0.0}  # fmt: skip
 CONTROLLER = {"kind": "pd_filtered", "p": 40.0, "d": 2.0, "n": 200.0, "torque_limit_nm": None}
@@ -63,7 +63,7 @@ def compiled():
 
 @pytest.fixture(autouse=True)
 def short(monkeypatch):
-    monkeypatch.setattr(baseline_fit, "BUDGET_S", 7.0)
+    monkeypatch.setattr(baseline_fit, "BUDGET_S", 3.5)
 
 
 def test_the_plain_baselines_read_records(tmp_path):

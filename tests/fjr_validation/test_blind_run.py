@@ -237,7 +237,7 @@ def order(out: Path, cases: int) -> list[str]:
 @pytest.mark.slow
 def test_a_run_that_is_killed_goes_on_where_it_was(state, tmp_path):
     out = tmp_path / "blind"
-    command = [sys.executable, "-m", "fjr_cli", *order(out, cases=3), "--workers", "1"]
+    command = [sys.executable, "-m", "fjr_cli", *order(out, cases=2), "--workers", "1"]
     verdicts = out / "verdicts.jsonl"
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as process:
         while not verdicts.exists() and process.poll() is None:
@@ -245,15 +245,15 @@ def test_a_run_that_is_killed_goes_on_where_it_was(state, tmp_path):
         process.send_signal(signal.SIGINT)
         process.communicate()
     before = verdicts.read_bytes()
-    assert before.count(b"\n") in (1, 2)
+    assert before.count(b"\n") == 1
     with verdicts.open("ab") as file:
         file.write(b'{"case": "closed_00')
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     assert Path(done.stdout.strip().splitlines()[-1]) == out / "report" / "report.md"
     after = verdicts.read_bytes()
-    assert after.startswith(before) and after.count(b"\n") == 3
+    assert after.startswith(before) and after.count(b"\n") == 2
     seen = {json.loads(line)["case"] for line in after.splitlines()}
-    assert seen == {"closed_0000", "closed_0001", "closed_0002"}
+    assert seen == {"closed_0000", "closed_0001"}
     assert not list((out / "cases").iterdir())
     answers = JsonLines(out / "answers.jsonl").read()
     assert {line["case"] for line in answers} == seen
