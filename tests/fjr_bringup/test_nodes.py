@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import json
 from typing import Any
 
@@ -25,8 +24,9 @@ from fjr_interface.experiment import Experiment
 from fjr_sim_node.simulation.simulator import SIMULATOR, run_realization
 
 
-@pytest.mark.parametrize("order", list(map("".join, itertools.permutations("sce"))), ids=str)
+@pytest.mark.parametrize("order", ["sce", "ces", "esc"])
 def test_nodes_started_in_any_order_play_the_experiment(start, rig, order):
+    """Of these orders each node is the first, the second and the last, and before each other."""
     nodes = by_hand(start)
     started = [nodes[letter]() for letter in order]
     torque = rig.hear_all_of(described())
