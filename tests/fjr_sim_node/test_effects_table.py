@@ -173,7 +173,8 @@ def test_a_new_effect_is_one_entry_and_its_law(tmp_path: Path) -> None:
     (tmp_path / "rig.yaml").write_text(
         "/rig/simulator:\n  ros__parameters:\n    cubic_drag:\n      nm_s3_rad3: 2.0\n"
     )
-    environment = {**os.environ, "PYTHONPATH": str(tmp_path), "XDG_CACHE_HOME": str(tmp_path)}
+    places = {"PYTHONPATH": str(tmp_path), "XDG_CACHE_HOME": str(tmp_path)}
+    environment = {**os.environ, **places, "NUMBA_OPT": "1"}  # all kernels are compiled anew
     done = subprocess.run(
         [sys.executable, "-c", USE], cwd=tmp_path, env=environment, capture_output=True, text=True
     )
