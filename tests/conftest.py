@@ -59,8 +59,12 @@ class Dealer(LoadFileScheduling):
 
 @cache
 def plays_on_graph(module: str) -> bool:
-    """Tell whether a test module, by its path, has tests that play on a ROS graph."""
-    return GRAPH.search((ROOT / module).read_text(encoding="utf-8")) is not None
+    """Tell whether a test module, by its path, has tests that play on a ROS graph.
+
+    What is marked as slow has other work to do than that.
+    """
+    text = (ROOT / module).read_text(encoding="utf-8")
+    return GRAPH.search(text) is not None and "pytestmark = pytest.mark.slow" not in text
 
 
 @pytest.hookimpl(optionalhook=True)

@@ -12,7 +12,7 @@ import pytest
 from processes import exit_status, wait_for
 from workspace import EXPERIMENTS, PACKAGES, WORKSPACE
 
-pytestmark = pytest.mark.ros
+pytestmark = pytest.mark.slow  # most of it builds and compiles, beside the graphs of others
 
 COLCON = Path(sys.executable).with_name("colcon")
 
