@@ -20,6 +20,9 @@ IDLE_S = 90.0
 COMPUTING_S = 300.0
 """How much processor time they may use meanwhile. Both bounds only end a test that hangs."""
 
+INTERRUPTED = (130, -signal.SIGINT)
+"""A shell shows 130 for both: `python -m` ends by the signal itself if it came within an exec()."""
+
 
 def marked_processes(mark: str) -> list[int]:
     """Return the processes, other than this one, that were started with FJR_TEST=mark."""

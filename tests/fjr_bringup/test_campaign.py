@@ -1,25 +1,20 @@
-"""Campaigns from the command line: options, resuming, Ctrl-C, damaged folders, the demo."""
+"""Campaigns in batch from the command line: options, resuming, Ctrl-C, damaged folders."""
 
 from __future__ import annotations
 
 import re
-import signal
 from pathlib import Path
 
 import numpy as np
 import pytest
-from processes import Starter
+from processes import INTERRUPTED
 
 from bla_analyzer import Fit
 from fjr_bringup.campaign.plan import CAMPAIGN_FILE, Campaign
 from fjr_bringup.campaign.settings import parse_settings
-from fjr_cli.demo import DEMO
 from fjr_interface.bags.folder_names import bag_folder
 from fjr_interface.bags.reader import BagReader, audit, read_record
 from fjr_sim_node.simulation.simulator import run_realization
-
-INTERRUPTED = (130, -signal.SIGINT)
-"""A shell shows 130 for both: `python -m` ends by the signal itself if it came within an exec()."""
 
 SHORT = [
     *("--realizations", "2", "--periods", "1"),
@@ -147,35 +142,6 @@ def test_resuming_makes_only_what_is_missing_with_the_same_bytes(run, tmp_path):
     assert files(folder) == whole and kept.stat().st_mtime_ns == before
 
 
-@pytest.mark.parametrize("signal_number", [signal.SIGINT, signal.SIGTERM])
-def test_interrupted_run_keeps_bags_and_resumes_to_the_same_bytes(
-    run, tmp_path, start: Starter, signal_number
-):
-    options = ["--realizations", "3", "--periods", "3", "--transient-periods", "0",
-               "--set", "excitation.base_frequency_hz=0.5",
-               "--set", "excitation.f_min_hz=0.5"]  # fmt: skip
-    out = tmp_path / "x"
-    campaign = start("fjr_cli", "run", "--out", str(out), *options)
-    first, second = bag_folder(out, 0, 0), out / f".{bag_folder(out, 0, 1).name}.partial"
-    campaign.wait_for(second.exists, "the second bag")
-    assert campaign.interrupt(signal_number) in INTERRUPTED, campaign.output
-    assert f"Interrupted: 1 of 3 bags are finished and kept in {out}" in campaign.output
-    assert f"to go on: fjr run --out {out}" in campaign.output
-    assert [path.name for path in out.glob("level_*")] == [first.name]
-    assert not list(out.glob(".*"))
-    audit(first)
-    whole = tmp_path / "whole"
-    assert run("simulate", "--out", whole, *options, "--workers", "1").exit_code == 0
-    if signal_number == signal.SIGINT:  # the folder that the other one leaves is the same
-        resumed = start("fjr_cli", "run", "--out", str(out), "--composed")
-        assert resumed.exit_status() == 0, resumed.output
-        assert "1 of 3 bags are there already." in resumed.output
-        assert resumed.output.splitlines()[-1] == str(out)
-        assert files(out) == files(whole)
-    else:
-        assert files(out).items() < files(whole).items()
-
-
 def test_interrupted_simulation_keeps_finished_bags(tmp_path, start_program):
     out = tmp_path / "x"
     options = ["--realizations", "400", "--periods", "3", "--workers", "2"]
@@ -221,20 +187,3 @@ def test_a_second_encoder_is_recorded_and_both_are_analyzed_and_fitted(run, tmp_
 def test_settings_are_typed_as_ros_does():
     parsed = parse_settings(["excitation.amplitudes_rad=[1e-3, 7e-3]", "simulator.k1=0"])
     assert parsed == {"excitation": {"amplitudes_rad": (1e-3, 7e-3)}, "simulator": {"k1": 0}}
-
-
-def test_demo_ends_with_its_report_and_a_second_one_keeps_the_bags(
-    run, tmp_path, domain, monkeypatch
-):
-    excitation = {**DEMO["excitation"], "base_frequency_hz": 2.0, "f_min_hz": 2.0}
-    monkeypatch.setitem(DEMO, "excitation", excitation)
-    report = tmp_path / "demo" / "analysis" / "report.html"
-    done = run("demo", "--out", tmp_path / "demo")
-    assert done.exit_code == 0 and done.stdout.splitlines()[-1] == str(report)
-    assert "BLA" in report.read_text(encoding="utf-8")
-    bags = files(tmp_path / "demo")
-    assert len(bags) == 14
-    again = run("demo", "--out", tmp_path / "demo")
-    assert again.exit_code == 0 and again.stdout.splitlines()[-1] == str(report)
-    assert "7 of 7 bags are there already." in again.stderr
-    assert files(tmp_path / "demo") == bags
