@@ -29,7 +29,12 @@ def own_domain() -> Iterator[int]:
 
 
 class Peer:
-    """A node in the test's own process that stands for other programs in the graph."""
+    """A node in the test's own process that stands for other programs in the graph.
+
+    Attributes:
+        look_s: how long it lets pass between two looks for messages.
+        after_each_look: what it does then.
+    """
 
     def __init__(self, domain: int) -> None:
         import rclpy
@@ -41,6 +46,7 @@ class Peer:
         rclpy.init(context=self.context, domain_id=domain)
         self.node = rclpy.create_node("peer", namespace="/rig", context=self.context)
         self._heard: list[tuple[Any, list[Any]]] = []
+        self.look_s = 0.01
         self.after_each_look: Callable[[], None] = lambda: None
         self._clients = rclpy.create_node("peer_clients", namespace="/rig", context=self.context)
         self._executor = SingleThreadedExecutor(context=self.context)
@@ -58,7 +64,7 @@ class Peer:
         from fjr_interface.ros.runtime import take_all
 
         def spin() -> Any:
-            self._executor.spin_once(timeout_sec=0.01)
+            self._executor.spin_once(timeout_sec=self.look_s)
             for subscription, heard in self._heard:
                 heard.extend(take_all(subscription))  # an executor would lag behind the lockstep
             self.after_each_look()

@@ -26,6 +26,7 @@ class Joint:
         from fjr_interface.ros import runtime
 
         self.peer, self.sample = peer, 0
+        peer.look_s = 0.001  # each sample waits for a look
         self.torque = peer.listen(JointState, "motor_torque", runtime.SIGNAL_QOS)
         self.said = peer.listen(DiagnosticArray, "/diagnostics", 100)
         create = peer.node.create_publisher
