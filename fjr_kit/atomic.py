@@ -87,9 +87,14 @@ class Partial:
         self.path.replace(self.place)
 
     def clear_away(self) -> None:
-        """Remove the hidden folder with what is left in it."""
-        shutil.rmtree(self._hidden, ignore_errors=True)
-        os.close(self._lock)
+        """Remove the hidden folder with what is left in it, also if Ctrl-C comes meanwhile."""
+        try:
+            shutil.rmtree(self._hidden, ignore_errors=True)
+        except BaseException:
+            shutil.rmtree(self._hidden, ignore_errors=True)
+            raise
+        finally:
+            os.close(self._lock)
 
 
 @contextmanager

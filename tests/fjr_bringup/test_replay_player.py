@@ -298,6 +298,7 @@ def test_another_programs_clock_keeps_the_time(start, peer, tmp_path):
     assert len(heard) == 501  # the clock stands, and so does the replay
     peer.after_each_look = lambda: tick(begin_ns + 60_000 * MS)
     assert ears.hear_out(replayed) == 0, replayed.output
+    peer.spin_until(lambda: len(heard) >= SAMPLES, "what the replay has left to be taken")
     assert [stamp_ns(message) for message in heard] == [k * MS for k in range(1, SAMPLES + 1)]
 
 

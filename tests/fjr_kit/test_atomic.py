@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import shutil
 import signal
 import subprocess
 import sys
@@ -130,3 +131,16 @@ def test_writers_of_one_file_wait_for_each_other(tmp_path: Path):
     process.join()
     assert process.exitcode == 0 and seen <= set("abp")
     assert names(tmp_path) == ["file"]
+
+
+def test_ctrl_c_while_the_hidden_folder_is_cleared_away_leaves_none(tmp_path: Path, monkeypatch):
+    place, rmtree = tmp_path / "result.npz", shutil.rmtree
+
+    def pressed(folder: Path, **options: bool) -> None:
+        monkeypatch.setattr(shutil, "rmtree", rmtree)
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt), whole_file(place) as path:
+        path.write_bytes(b"all")
+        monkeypatch.setattr(shutil, "rmtree", pressed)
+    assert list(tmp_path.iterdir()) == [place] and place.read_bytes() == b"all"
