@@ -92,7 +92,7 @@ def pytest_runtest_protocol(item: pytest.Item) -> None:
     if "PYTEST_XDIST_WORKER" in os.environ and FIRST not in item.config.stash:
         item.config.stash[FIRST] = item.nodeid.partition("::")[0]
         if not plays_on_graph(item.config.stash[FIRST]):
-            os.nice(5)
+            os.nice(2)
 
 
 @pytest.fixture(scope="session", autouse=True)
