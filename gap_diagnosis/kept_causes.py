@@ -52,7 +52,7 @@ def kept(
         blurred = any(t.passes_beside_size and not t.certain for t in failed)
         weakest = min(tested if blurred else failed, key=lambda t: t.gain.mean)
         before = [fit for fit in steps if weakest.effect not in fit.effects]
-        notes += _changing(weakest)
+        notes += [*_changing(weakest), *_kin(weakest)]
         last = weakest.without
         same = last.effects == before[-1].effects
         if not same:
@@ -74,6 +74,17 @@ def _changing(tested: Tested) -> list[str]:
         f"{explanation([tested.effect]).capitalize()} would close {tested.share.value:.0%} of what "
         "the refit left, but not with the same size at all levels "
         f"(p = {tested.invariance_p:.1g}), so it is not named: what is there follows another law."
+    ]
+
+
+def _kin(tested: Tested) -> list[str]:
+    """Return the sentence on a cause that is not named since most of the error stays beside it."""
+    if not tested.nearest_kin:
+        return []
+    return [
+        f"{explanation([tested.effect]).capitalize()} would close {tested.share.value:.0%} of what "
+        "the refit left, and does so on data that no fit has seen, but most of the error stays, so "
+        "it is not named: what is there may be of a law whose nearest kin in the catalogue it is."
     ]
 
 

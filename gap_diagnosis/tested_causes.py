@@ -86,6 +86,13 @@ class Tested:
         return there and self.invariant and self.present >= least
 
     @property
+    def nearest_kin(self) -> bool:
+        """Whether it is not called present only because most of the error stays beside it."""
+        alone = self.present / self._beside_much
+        passes = self.certain and self.gain.present and self._closes and not self.bounded
+        return passes and self.invariant and self.present < LEAST_PRESENT <= alone
+
+    @property
     def invariant(self) -> bool:
         """Whether its size may be the same at all levels, or differs by what closes no more."""
         chance = self.invariance_p is None or self.invariance_p >= LEAST_INVARIANCE_P

@@ -9,10 +9,18 @@ from dataclasses import replace
 import pytest
 from test_evidence import NOMINAL, SCATTER, records
 
-from gap_diagnosis.kept_causes import SURE, _begun_anew, _changing, _guesses, _one_by_one, kept
+from gap_diagnosis.kept_causes import (
+    SURE,
+    _begun_anew,
+    _changing,
+    _guesses,
+    _kin,
+    _one_by_one,
+    kept,
+)
 from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.outcome.diagnosis import Estimate
-from gap_diagnosis.tested_causes import causes_with_tests
+from gap_diagnosis.tested_causes import LEAST_PRESENT, causes_with_tests
 from gap_diagnosis.which import stepwise
 from gap_diagnosis.which.cell_fits import CellFitter
 from gap_diagnosis.which.found import Found
@@ -145,3 +153,16 @@ def test_a_cause_is_doubtful_where_most_of_the_error_is_left_however_it_is_count
     )
     beside = replace(closes, left=motion, over_noise=over_noise)
     assert beside.present == pytest.approx(share * closes.present, rel=0.02)
+
+
+def test_the_nearest_kin_of_what_no_effect_explains_is_told_in_a_note(searched):
+    fitter, fits = searched
+    sure = max(causes_with_tests(fitter, fits[3], fits[0], SCATTER), key=lambda t: t.present)
+    assert not sure.nearest_kin and _kin(sure) == []
+    share = sure.share.model_copy(update={"value": 0.6, "low": 0.5})
+    doubted = replace(sure, share=share, left=0.9, over_noise=0.9, in_band=0.6)
+    assert 0.5 * LEAST_PRESENT < doubted.present < LEAST_PRESENT and doubted.nearest_kin
+    (said,) = _kin(doubted)
+    assert "60% of what the refit left" in said and "nearest kin" in said
+    assert not replace(doubted, certain=False).nearest_kin
+    assert not replace(doubted, left=0.1).nearest_kin
