@@ -6,6 +6,7 @@ Both searches try the effects of `catalogue` from starts of `search_space` in th
 
 Steady periods: `fits`, `search`, `harmonics`, `reduced_fits`, then `attribution`, `estimates` and
 `confidence`. Records: `cell_fits` with the remainder in the covariance (`cell_weights`, and
-`unseen_friction` of runs that no fit has seen), `stepwise`, then `presence` (repeats, invariance,
-interval). `equivalents` knows what may stand in for what, `rounding` judges a coarse encoder.
+`unseen_friction` of runs that no fit has seen), `stepwise` with its single step in `extension` and
+causes put in place of each other in `exchange`, then `presence` (repeats, invariance, interval).
+`equivalents` knows what may stand in for what, `rounding` simulates and judges a coarse encoder.
 """
