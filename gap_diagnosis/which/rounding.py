@@ -14,6 +14,7 @@ its own, show both.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
@@ -78,15 +79,16 @@ def in_the_loop(
     rng = np.random.default_rng(seed)
     rounds = model.with_effects({f"{ROUNDING}.resolution_rad": step})
     outputs, lines = noise_std.shape[1:]
-    shape = len(noise_std), _SIMULATED, simulator.samples
-    noise = rng.normal(0.0, _DITHER * step, shape)
-    jobs = [(i, k) for i in range(shape[0]) for k in range(_SIMULATED)]
-    runs = run_parallel(lambda job: simulator.disturbed(rounds, job[0], noise[job]), jobs)
-    signals = np.array(runs).reshape(*shape[:2], *runs[0].shape)
-    spectra = line_spectrum(signals[:, :, [0, 2][:outputs]], lines)
-    scatter = uniform_filter1d(np.var(spectra, axis=1, ddof=1), _ALIKE, mode="nearest")
-    smooth = np.stack(simulator.motion(model, range(shape[0])), axis=1)
-    return Rounded(signals.mean(axis=1) - smooth, np.sqrt((1.0 + 1.0 / _SIMULATED) * scatter))
+    smooth = np.stack(simulator.motion(model, range(len(noise_std))), axis=1)
+    added, scatter = np.empty_like(smooth), np.empty(noise_std.shape)
+    for index in range(len(noise_std)):  # one by one, for the memory that runs of hours take
+        noise = rng.normal(0.0, _DITHER * step, (_SIMULATED, simulator.samples))
+        runs = np.array(run_parallel(partial(simulator.disturbed, rounds, index), list(noise)))
+        added[index] = runs.mean(axis=0) - smooth[index]
+        spectra = line_spectrum(runs[:, [0, 2][:outputs]], lines)
+        scatter[index] = np.var(spectra, axis=0, ddof=1)
+    scatter = uniform_filter1d(scatter, _ALIKE, mode="nearest")
+    return Rounded(added, np.sqrt((1.0 + 1.0 / _SIMULATED) * scatter))
 
 
 def with_rounding(
