@@ -176,7 +176,7 @@ def _rounding_in_the_loop(
     for _ in range(_ROUNDS):
         if least < NOTHING_LEFT * fitter.held.size:
             break
-        rounded = in_the_loop(simulator, refit.model, step, std)
+        rounded = in_the_loop(simulator, refit.model, step, std.shape)
         other = simulator.adding(rounded.added)
         fitter = fitted_by(other, np.hypot(std, rounded.std))
         refit = fitter.refit()

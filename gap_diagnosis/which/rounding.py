@@ -64,24 +64,21 @@ def coarse(recorded: RecordedExperiment, step: float) -> bool:
     return min(float(np.std(r.position)) for r in recorded.realizations) < _FEW_COUNTS * step
 
 
-def in_the_loop(
-    simulator: Simulator, model: Model, step: float, noise_std: np.ndarray, seed: int = 0
-) -> Rounded:
+def in_the_loop(simulator: Simulator, model: Model, step: float, shape: tuple[int, ...]) -> Rounded:
     """Return what rounding does to the motion of a model whose encoder does not round.
 
     Args:
         simulator: of a loop that is known.
         model: the model.
         step: of the encoder, rad.
-        noise_std: `NoiseLevels.of_outputs`, (realizations, outputs, lines), rad.
-        seed: of the noise of each simulation.
+        shape: realizations, outputs and lines.
     """
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     rounds = model.with_effects({f"{ROUNDING}.resolution_rad": step})
-    outputs, lines = noise_std.shape[1:]
-    smooth = np.stack(simulator.motion(model, range(len(noise_std))), axis=1)
-    added, scatter = np.empty_like(smooth), np.empty(noise_std.shape)
-    for index in range(len(noise_std)):  # one by one, for the memory that runs of hours take
+    realizations, outputs, lines = shape
+    smooth = np.stack(simulator.motion(model, range(realizations)), axis=1)
+    added, scatter = np.empty_like(smooth), np.empty(shape)
+    for index in range(realizations):  # one by one, for the memory that runs of hours take
         noise = rng.normal(0.0, _DITHER * step, (_SIMULATED, simulator.samples))
         runs = np.array(run_parallel(partial(simulator.disturbed, rounds, index), list(noise)))
         added[index] = runs.mean(axis=0) - smooth[index]

@@ -129,7 +129,7 @@ def test_rounding_moves_a_motion_of_few_counts_in_the_mean_as_simulated(few_coun
     std = noise_levels(recorded).of_outputs(recorded)
     samples = recorded.experiment.samples_per_period
     true = few_counts.bare
-    found = rounding.in_the_loop(simulator, true, FEW_COUNTS, std)
+    found = rounding.in_the_loop(simulator, true, FEW_COUNTS, std.shape)
     every = range(len(recorded.realizations))
     white = Misfit(recorded, simulator, widened(std, FEW_COUNTS, samples), every)
     moved = Misfit(recorded, simulator.adding(found.added), np.hypot(std, found.std), every)
