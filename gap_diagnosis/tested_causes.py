@@ -34,7 +34,7 @@ _IF_NOTHING = 0.75  # of what a cause would be present, where all of that is lef
 _MUCH_LEFT = (0.3, 0.5)
 """Shares of the refit's error, of the motion and over noise alike, between which what an
 explanation leaves makes its causes doubtful: of 9 that left more than 0.4 in the blind checks 317
-to 320 none was right, of 17 that left 0.25 to 0.4 all but four."""
+to 320 none was right, of 17 that left 0.2 to 0.4 all but four."""
 _IF_MOST = 0.6  # of what a cause would be present, where more than that is left
 
 

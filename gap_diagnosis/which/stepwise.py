@@ -81,6 +81,7 @@ class Stepwise:
             looks = [self._singles, self._pairs_of_slow_motion]
         for look in looks:
             if fits and self._over:
+                found.complete = False
                 return False
             fits = look(fits, found) or fits
             if (chosen := self._repeating(fits, found)) is not None:

@@ -67,3 +67,12 @@ def test_what_gains_but_closes_too_little_is_tried_in_pairs(fitted, monkeypatch)
     found = Found([fits[0], best])
     assert search._step(found) and found.best is both
     assert tried == [best.effects, half.effects]
+
+
+def test_a_search_whose_time_is_up_before_pairs_are_tried_is_not_complete(fitted, monkeypatch):
+    fitter, fits = fitted
+    search = Stepwise(fitter, NAMES, until=0.0)
+    half = replace(fits[2], left=0.9 * fits[1].left)
+    monkeypatch.setattr(search.extension, "extended", lambda *_: [half])
+    found = Found([fits[0], fits[1]])
+    assert not search._step(found) and not found.complete
