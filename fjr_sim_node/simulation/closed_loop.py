@@ -188,7 +188,8 @@ def simulate_law(
         command: torque command of the drive, (samples,) in N m, beside which the law is an
             observer whose torque no delay holds up; None where the law makes the command.
         added: torque that a controller commands beside its law, (samples,) in N m; None for none.
-        start: position (rad) and velocity (rad/s) of all bodies at the first sample.
+        start: position (rad) and velocity (rad/s) that the encoder reads at the first sample, all
+            bodies moving as one.
         controller_state: state of the law before it, such as the `entering_state` of a record;
             None for zero.
         begin: where the simulation begins, whatever the three say; None for what they say.
@@ -199,7 +200,7 @@ def simulate_law(
     """
     if begin is None:
         begin = State.at_rest(controller, elapsed_s)
-        rig.move(begin.rig, *start)
+        rig.move(begin.rig, *rig.under_reading(*start, effects))
         if controller_state is not None:
             begin.law[:-1] = _of_length(
                 controller_state, controller.states, "controller_state", "states"

@@ -22,6 +22,7 @@ _EXTRA, _LAGGED = 4, 6
 _SLACK, _TIME, _SLEWED, _HEAD, _RING = 10, 11, 12, 13, 14
 _RING_SIZE = 16_384  # samples of the longest delay: 100 ms at 20 kHz, each in eight parts
 _SLEW_PARTS = 8
+_NEWTON_STEPS = 6  # an encoder of half a radian's error is inverted to rounding
 _AT_ONCE = 1e-3  # of a sample: a torque that slews no longer is held as a whole
 
 
@@ -40,6 +41,29 @@ def move(state: np.ndarray, position: float, velocity: float) -> None:
     """Set all bodies to one position (rad) and velocity (rad/s), a cable pulling nowhere there."""
     state[: 2 * _BODIES] = (position, velocity) * _BODIES
     state[_SLACK] = position
+
+
+def under_reading(reading: float, rate: float, e: np.ndarray | None) -> tuple[float, float]:
+    """Return motor position (rad) and velocity (rad/s) at which the encoder reads something.
+
+    The inverse of `measure` without noise and counts, by Newton's method.
+
+    Args:
+        reading: position that the encoder reads, in rad.
+        rate: how fast it changes, in rad/s.
+        e: from `effects.coefficients`, or None.
+    """
+    if e is None:
+        return reading, rate
+    amplitude, phase = (
+        e[fx.ENCODER_ECCENTRICITY_AMPLITUDE_RAD],
+        e[fx.ENCODER_ECCENTRICITY_PHASE_RAD],
+    )
+    position, slope = reading, 1.0
+    for _ in range(_NEWTON_STEPS):
+        slope = 1.0 + amplitude * math.cos(position + phase)
+        position -= (position + amplitude * math.sin(position + phase) - reading) / slope
+    return position, rate / slope
 
 
 def complete(state: np.ndarray, torque: float, elapsed_s: float, middle_rad: float) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -20,6 +20,8 @@ _STEP = 1e-3
 _TIED = 0.3  # of the greatest share that a parameter has in the combination that is known worst
 _NOTHING = 1e-9  # of the greatest information: less is rounding
 _DIVERGED = 1e5
+_FAR = 0.03  # relative change of a parameter from which slopes are taken anew
+_RENEWED = 3  # times at the most
 
 
 class Sight(Protocol):
@@ -66,6 +68,37 @@ def bare_refit(sight: Sight, nominal: Model) -> BareRefit:
             "The nominal simulation diverges in this experiment; check its values and units."
         )
     return BareRefit(nominal.plant, names, ((runs[1::2] - runs[2::2]) / (2.0 * _STEP)).T)
+
+
+def left_by_refit(sight: Sight, refit: BareRefit, target: np.ndarray) -> np.ndarray:
+    """Return what a refit leaves of the way from its bare plant to a target, (errors,).
+
+    Its slopes are taken anew where it ends too far away for them to hold.
+
+    Args:
+        sight: of the experiment.
+        refit: of the nominal plant.
+        target: errors of a rig, (errors,).
+    """
+    ends: list[tuple[float, dict[str, float]]] = []
+
+    def change_from(plant: Mapping[str, float]) -> np.ndarray:
+        change = target - sight.errors([Model(plant, {})])[0]
+        ends.append((_size(change), dict(plant)))
+        return change
+
+    left = refit.left_by_refit(change_from, _size)
+    for _ in range(_RENEWED):
+        end = min(ends, key=lambda end: end[0])[1]
+        if all(abs(end[name] - value) <= _FAR * abs(value) for name, value in refit.plant.items()):
+            break
+        refit = bare_refit(sight, Model(end, {}))
+        left = min(left, refit.left_by_refit(change_from, _size), key=_size)
+    return left
+
+
+def _size(change: np.ndarray) -> float:
+    return float(np.linalg.norm(change))
 
 
 def parameters(sight: Sight, refit: BareRefit, tolerance: float) -> list[ForeseenParameter]:

@@ -22,7 +22,7 @@ from ..outcome.verdict_words import ROUNDING
 from ..which.equivalents import SCALES
 from ..which.screening import by_shape
 from ..which.search_space import beside, starts
-from .bare_parameters import Sight
+from .bare_parameters import Sight, left_by_refit
 from .foreseen import ForeseenEffect
 
 _MOST = 20.0  # times what the slope of a shape promises
@@ -250,11 +250,7 @@ class EffectLimits:
         return self._refit.left(self._with(shape, factor) - self._bare)
 
     def _by_refit(self, shape: Shape, factor: float) -> np.ndarray:
-        target = self._with(shape, factor)
-        return self._refit.left_by_refit(
-            lambda plant: target - self._sight.errors([Model(plant, {})])[0],
-            lambda change: float(np.linalg.norm(change)),
-        )
+        return left_by_refit(self._sight, self._refit, self._with(shape, factor))
 
     def _with(self, shape: Shape, factor: float) -> np.ndarray:
         return self._sight.errors([beside(self._nominal, shape.at(factor))])[0]

@@ -38,7 +38,7 @@ class Drive:
         law: the controller, or the observer.
         command: recorded torque that drives the model, (samples,) in N m; None in the loop.
         added: recorded torque that the law does not make, likewise; None where it makes all.
-        start: position (rad) and velocity (rad/s) at the first sample.
+        start: position (rad) and velocity (rad/s) that the encoder reads at the first sample.
         entry: state of the law before it; None for zero.
         elapsed_s: time since the first run began, for what drifts.
     """

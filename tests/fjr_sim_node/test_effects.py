@@ -682,6 +682,17 @@ def test_eccentricity_adds_its_sine_once_per_turn():
         assert rig.measure(x, 1e-5, e) == pytest.approx(expected, rel=1e-14)
 
 
+@pytest.mark.parametrize("size", [0.0, 1e-3, 0.5])
+def test_a_rig_can_begin_where_an_eccentric_encoder_reads_something(size):
+    on = named("encoder_eccentricity", amplitude_rad=size, phase_rad=0.6) if size else {}
+    e, x, step = effects.coefficients(on), rig.at_rest(), 1e-6
+    for reading in np.linspace(-7.0, 7.0, 57):
+        at, speed = rig.under_reading(reading, 3.0, e)
+        for later in (0.0, step):
+            rig.move(x, at + later * speed, speed)
+            assert rig.measure(x, 0.0, e) == pytest.approx(reading + later * 3.0, abs=2e-11)
+
+
 @pytest.mark.parametrize("elapsed", [0.0, 10.0, 100.0])
 def test_nonstationary_friction_has_drifted_by_rate_times_time(elapsed):
     drifting = Rig({}, named("nonstationary", friction_per_s=-0.004), rig.at_rest(elapsed))

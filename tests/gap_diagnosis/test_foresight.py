@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 from gap_cases import SHORT, simulate_case, with_other_noise
 
+from excitation_node.record_experiment import RECORD, describe_record
 from fjr_bringup import Campaign
 from fjr_bringup.design.planned import planned_record
 from fjr_kit.errors import InputError
 from fjr_kit.showing import BareRefit
 from fjr_records.noise import noise_levels
+from fjr_records.records import RecordSet
 from fjr_sim_node.plant import PLANT
 from gap_diagnosis import Foresight, foresee, investigate
 from gap_diagnosis.foresight.periodic_sight import PeriodicSight
@@ -196,24 +198,31 @@ def test_a_refit_takes_over_what_its_slopes_span():
     assert left == pytest.approx(refit.left(other), abs=1e-9)
 
 
-def test_records_show_an_effect_above_their_limit():
-    from excitation_node.record_experiment import RECORD, describe_record
+def chirps(noise_rad: float, rig=None) -> RecordSet:
+    """Return three sweeps of a rig."""
+    campaign = planned(noise_rad, rig, amplitudes_rad=(2e-2,), realizations=3)
+    law = campaign.experiment(0, 0).controller
+    values = RECORD.check({"duration_s": 10.0}, "record")
+    runs = [
+        describe_record("chirp", campaign.values["excitation"], values, *run, law)
+        for run in campaign.runs
+    ]
+    recorded = planned_record(campaign, runs)
+    assert isinstance(recorded, RecordSet)
+    return recorded
 
-    noise = 1e-4
-    seen = {}
-    for factor in (0.0, 5.0, 0.2):
-        rig = {} if not factor else sized(seen["one"], factor)
-        campaign = planned(noise, rig, amplitudes_rad=(2e-2,), realizations=3)
-        law = campaign.experiment(0, 0).controller
-        values = RECORD.check({"duration_s": 10.0}, "record")
-        runs = [
-            describe_record("chirp", campaign.values["excitation"], values, *run, law)
-            for run in campaign.runs
-        ]
-        records = planned_record(campaign, runs)
-        if factor:
-            found = investigate_records(records, NOMINAL, effects=["backlash"]).diagnosis
-            seen[factor] = found.effects
-        else:
-            (seen["one"],) = foresee(records, NOMINAL, effects=["backlash"]).effects
-    assert seen[5.0] == ["backlash"] and seen[0.2] == []
+
+def test_records_show_an_effect_above_their_limit():
+    noise, only = 1e-4, ["backlash"]
+    (one,) = foresee(chirps(noise), NOMINAL, effects=only).effects
+    found = [
+        investigate_records(chirps(noise, sized(one, factor)), NOMINAL, effects=only).diagnosis
+        for factor in (5.0, 0.2)
+    ]
+    assert [diagnosis.effects for diagnosis in found] == [only, []]
+
+
+def test_short_ways_hardly_show_an_eccentric_encoder():
+    """It scales all parameters about one angle, and what it reads at the start shows nothing."""
+    (one,) = foresee(chirps(1e-5), NOMINAL, effects=["encoder_eccentricity"]).effects
+    assert one.limit > 0.05
