@@ -91,7 +91,8 @@ def test_readers_get_the_whole_bag_as_fast_as_they_take_it(start, peer, tmp_path
 def test_chosen_topics_from_an_offset_again_and_again_until_ctrl_c(start, mark, peer, tmp_path):
     write_bag(tmp_path / "bag", DESCRIBED)
     ears = Ears(peer)
-    options = ["--topic", "reference", "--start-offset", "2.5", "--rate", "4", "--loop"]
+    # what is late goes out at once: on a busy machine a higher rate would push out what is unread
+    options = ["--topic", "reference", "--start-offset", "2.5", "--rate", "0.9", "--loop"]
     replayed = replay(start, tmp_path / "bag", *options)
     reference = ears.signals["r"]
     peer.spin_until(lambda: len(reference) > 1100, "the third time")
@@ -108,7 +109,7 @@ def test_chosen_topics_from_an_offset_again_and_again_until_ctrl_c(start, mark, 
     cells = table(replayed.output)
     assert sorted(cells) == ["/clock", "/rig/experiment", "/rig/reference"]
     played, took = re.search(r"([\d.]+) s played in ([\d.]+) s", replayed.output).groups()
-    assert float(took) > float(played) / 4.0 - 0.01
+    assert float(took) > float(played) / 0.9 - 0.01
 
 
 def foreign(folder: Path) -> Path:
