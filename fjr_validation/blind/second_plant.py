@@ -32,7 +32,7 @@ _SIZE = _POSITIONS + _RING
 
 @part
 def _encoder(x, noise, jitter, s, h):
-    """Return what the encoder reads (rad), late by the delay and by chance."""
+    """Return what the encoder reads (rad), late by delay and chance; zero where it starts."""
     y = x[TH] + s[law.JITTER] * jitter * x[W]
     if s[law.DELAY] != 0.0:
         late = s[law.DELAY] / h
@@ -40,7 +40,7 @@ def _encoder(x, noise, jitter, s, h):
         y = (1.0 - late + whole) * x[_POSITIONS + (head - whole) % _RING]
         y += (late - whole) * x[_POSITIONS + (head - whole - 1) % _RING]
     if s[law.ECC] != 0.0:
-        y += s[law.ECC] * math.sin(y + s[law.ECC_PHASE])
+        y += s[law.ECC] * (math.sin(y + s[law.ECC_PHASE]) - math.sin(s[law.ECC_PHASE]))
     if s[law.INTERPOLATION] != 0.0:
         y += s[law.INTERPOLATION] * math.sin(s[law.INTERPOLATION_CYCLES] * y)
     y += noise

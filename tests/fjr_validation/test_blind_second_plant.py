@@ -217,6 +217,14 @@ def test_a_delayed_encoder_shows_the_past():
     assert np.allclose(record.y[3:], record.th[:-3], atol=1e-12)
 
 
+def test_an_eccentric_encoder_reads_zero_at_the_start_and_its_sine_beyond():
+    on = {"eccentricity_rad": 0.1, "eccentricity_phase_rad": 1.2}
+    record = play(reference(2)[:1500], on)
+    sine = 0.1 * (np.sin(record.th + 1.2) - math.sin(1.2))
+    assert record.y[0] == 0.0 and np.ptp(record.th) > 0.02
+    assert np.allclose(record.y - record.th, sine, atol=1e-12)
+
+
 def test_energy_of_the_free_undamped_plant_is_kept():
     free = {**NOMINAL, "fs": 0.0, "fsm": 0.0, "fv": 0.0, "fvm": 0.0}
     kick = np.zeros(2000)
