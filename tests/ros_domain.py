@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import random
 import socket
 from collections.abc import Callable, Iterator
@@ -42,6 +43,7 @@ class Peer:
 
         import fjr_interface.ros.runtime  # noqa: F401 - chooses profiles that rclpy.init reads
 
+        gc.freeze()  # a collection of all that tests have left takes longer than a queue lasts
         self.context = rclpy.Context()
         rclpy.init(context=self.context, domain_id=domain)
         self.node = rclpy.create_node("peer", namespace="/rig", context=self.context)
@@ -93,3 +95,4 @@ class Peer:
         self.node.destroy_node()
         self._clients.destroy_node()
         self.context.try_shutdown()
+        gc.unfreeze()

@@ -47,6 +47,23 @@ class Ears:
         self.peer.spin_until(lambda: started.process.poll() is not None, "the end of the replay")
         return started.exit_status()
 
+    def hear_all(self, samples: int) -> None:
+        """Listen until every signal has come whole; if it does not, say what of it came."""
+        heard = self.signals
+
+        def came() -> str:
+            return ", ".join(
+                f"{symbol}: {len(messages)} from {stamp_ns(messages[0]) if messages else None} on"
+                for symbol, messages in heard.items()
+            )
+
+        try:
+            self.peer.spin_until(
+                lambda: all(len(messages) == samples for messages in heard.values()), "samples"
+            )
+        except AssertionError as error:
+            raise AssertionError(f"{error}; of {samples} came {came()}") from None
+
     def description_for_a_late_comer(self) -> str:
         late = self.peer.listen(self._string, "experiment", self._latched)
         self.peer.spin_until(lambda: late, "the experiment, joining late")
@@ -72,7 +89,7 @@ def test_readers_get_the_whole_bag_as_fast_as_they_take_it(start, peer, tmp_path
     ears = Ears(peer)
     replayed = replay(start, tmp_path / "bag", "--rate", "max")
     assert ears.hear_out(replayed) == 0, replayed.output
-    peer.spin_until(lambda: all(len(x) == SAMPLES for x in ears.signals.values()), "all samples")
+    ears.hear_all(SAMPLES)
     for signal in SIGNALS:
         messages = ears.signals[signal.symbol]
         assert [stamp_ns(message) for message in messages] == DESCRIBED.stamps_ns.tolist()
