@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -96,8 +97,8 @@ def read_joint(path: Path | str, without: Collection[str] = ()) -> Joint:
         without: identifiers of effects to leave out.
 
     Raises:
-        InputError: no such file, no simulator in it, an unknown name, a value out of range, or an
-            unknown effect to leave out.
+        InputError: no such file, no simulator in it, an unknown name, a value out of range, a link
+            that is held, or an unknown effect to leave out.
     """
     given = load_parameter_file(path).get("simulator")
     if given is None:
@@ -111,4 +112,9 @@ def read_joint(path: Path | str, without: Collection[str] = ()) -> Joint:
                 f"There is no effect {shown(name)}; did you mean {nearest(name, effects.EFFECTS)}?"
             )
     values = SIMULATOR.check(given, f"{path}: /rig/simulator")
+    if math.isinf(values["j"]):
+        raise InputError(
+            f"{path}: j is infinite, a link that is held; give the inertia j (kg m2) of the link "
+            "that the joint is to move."
+        )
     return Joint(values, float(values["sample_rate_hz"]), str(path), frozenset(without))

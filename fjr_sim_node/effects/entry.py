@@ -154,6 +154,11 @@ class Effect:
         return self.axis != "rigid"
 
     @property
+    def on_held_link(self) -> bool:
+        """Whether a rig with a flexible transmission whose link cannot move can have it."""
+        return self.on_flexible_axis and self.acts_on != "link"
+
+    @property
     def full_parameters(self) -> tuple[EffectParameter, ...]:
         """The parameters under their full names, described with their effect."""
         return tuple(

@@ -43,7 +43,15 @@ __all__ = ["FS", "FSM", "FV", "FVM", "JM", "K0", "K1", "PLANT", "J", "advance", 
 
 PLANT = ParameterGroup(
     Parameter("jm", 0.2, "kg m2", "Motor inertia", 1e-6, 1e4, symbol="Jm", source="paper eq. 5"),
-    Parameter("j", 0.3, "kg m2", "Link inertia", 1e-6, 1e4, symbol="J", source="paper eq. 5"),
+    Parameter(
+        "j",
+        0.3,
+        "kg m2",
+        "Link inertia; .inf: the link is held",
+        1e-6,
+        symbol="J",
+        source="paper eq. 5",
+    ),
     Parameter("fs", 5.0, "N m", "Link Coulomb friction", 0.0, 1e5, symbol="fs", source="eq. 2"),
     Parameter("fsm", 6.0, "N m", "Motor Coulomb friction", 0.0, 1e5, symbol="fsm", source="eq. 2"),
     Parameter(

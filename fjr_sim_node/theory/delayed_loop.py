@@ -19,20 +19,22 @@ from scipy.optimize import root
 
 from controller_node.transfer_function import TransferFunction
 
-from .linear import g0, held_torque, state_space
+from .linear import g0, held_torque, motor_side
 
-_MOTOR = 2  # where the motor position stands in the state
 _FREQUENCIES = 4000
 
 
 def _delayed(
     parameters: Mapping[str, Any], sample_rate_hz: float, delay_s: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
-    """Return Phi (4, 4), Gamma_now (4,), Gamma_before (4,) and the whole samples of the delay."""
+    """Return Phi (n, n), Gamma_now (n,), Gamma_before (n,) and the whole samples of the delay.
+
+    The motor's position is the last state but one, see `motor_side`.
+    """
     period = 1.0 / sample_rate_hz
     whole = int(delay_s / period + 1e-9)
     rest = max(delay_s - whole * period, 0.0)
-    a, b = state_space(parameters)
+    a, b = motor_side(parameters)
     transition, _ = held_torque(a, b, period)
     after, now = held_torque(a, b, period - rest)
     return transition, now, after @ held_torque(a, b, rest)[1], whole
@@ -57,13 +59,13 @@ def delayed_g0(
         complex (F,) in rad/(N m); with a delay of zero `linear.g0`.
     """
     z = np.exp(2j * np.pi * np.asarray(frequency_hz, float) / sample_rate_hz)
-    column = np.zeros((z.size, 4), complex)
+    columns = []
     for delay_s in delays_s:
         transition, now, before, whole = _delayed(parameters, sample_rate_hz, float(delay_s))
-        column += (now + before / z[:, None]) / z[:, None] ** whole
-    resolvent = z[:, None, None] * np.eye(4) - transition
-    solved = np.linalg.solve(resolvent, column[..., None] / len(delays_s))
-    return solved[:, _MOTOR, 0]
+        columns.append((now + before / z[:, None]) / z[:, None] ** whole)
+    resolvent = z[:, None, None] * np.eye(len(transition)) - transition
+    solved = np.linalg.solve(resolvent, sum(columns)[..., None] / len(delays_s))
+    return solved[:, -2, 0]
 
 
 def spectral_radius(
@@ -71,23 +73,23 @@ def spectral_radius(
 ) -> float:
     """Return the greatest magnitude of a pole of the closed loop; it is stable below 1."""
     transition, now, before, whole = _delayed(parameters, sample_rate_hz, delay_s)
-    past, states = whole + 1, law.states
-    size = 4 + past + states
+    plant, past, states = len(transition), whole + 1, law.states
+    motor, size = plant - 2, plant + past + states
     torque = np.zeros(size)  # of this sample, by plant state, past torques and state of the law
-    torque[_MOTOR] = -law.position[0]
+    torque[motor] = -law.position[0]
     if states:
-        torque[4 + past] = 1.0
-    torques = [torque, *np.eye(size)[4 : 4 + past]]
+        torque[plant + past] = 1.0
+    torques = [torque, *np.eye(size)[plant : plant + past]]
     loop = np.zeros((size, size))
-    loop[:4, :4] = transition
-    loop[:4] += np.outer(now, torques[whole]) + np.outer(before, torques[whole + 1])
-    loop[4 : 4 + past] = torques[:past]
+    loop[:plant, :plant] = transition
+    loop[:plant] += np.outer(now, torques[whole]) + np.outer(before, torques[whole + 1])
+    loop[plant : plant + past] = torques[:past]
     for i in range(states):
-        row = loop[4 + past + i]
+        row = loop[plant + past + i]
         row -= law.denominator[i + 1] * torque
-        row[_MOTOR] -= law.position[i + 1]
+        row[motor] -= law.position[i + 1]
         if i + 1 < states:
-            row[4 + past + i + 1] += 1.0
+            row[plant + past + i + 1] += 1.0
     return float(np.abs(np.linalg.eigvals(loop)).max())
 
 

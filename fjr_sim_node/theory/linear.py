@@ -43,6 +43,21 @@ def state_space(
     return a, np.array([0.0, 0.0, 0.0, 1.0 / jm])
 
 
+def motor_side(parameters: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
+    """Return A (n, n) and B (n,) of what the motor feels, viscous friction only.
+
+    The last two states are those of the motor. The link's are left out where it has no motion of
+    its own, on a rigid axis, and where it is held: no loop about the motor moves their poles.
+
+    Args:
+        parameters: values of PLANT.
+    """
+    a, b = state_space(parameters)
+    if math.isinf(parameters["k0"]) or math.isinf(parameters["j"]):
+        return a[2:, 2:], b[2:]
+    return a, b
+
+
 def _rigid(inertia: float, viscous: float) -> tuple[np.ndarray, np.ndarray]:
     """Return A and B of a rigid axis, whose link moves as its motor does."""
     body = [[0.0, 1.0], [0.0, -viscous / inertia]]
@@ -101,17 +116,17 @@ def _states(at: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def held_torque(a: np.ndarray, b: np.ndarray, seconds: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return what a time under a torque of 1 N m does to the state: transition (4, 4), added (4,).
+    """Return what a time under a torque of 1 N m does to the state: transition (n, n), added (n,).
 
     Args:
-        a: (4, 4) from `state_space`.
-        b: (4,) from the same.
+        a: (n, n) from `state_space` or `motor_side`.
+        b: (n,) from the same.
         seconds: how long the torque is held.
     """
-    augmented = np.zeros((5, 5))
-    augmented[:4, :4], augmented[:4, 4] = a, b
+    augmented = np.pad(a, (0, 1))
+    augmented[:-1, -1] = b
     discrete = _exponential(augmented * seconds)
-    return discrete[:4, :4], discrete[:4, 4]
+    return discrete[:-1, :-1], discrete[:-1, -1]
 
 
 def _exponential(matrix: np.ndarray) -> np.ndarray:

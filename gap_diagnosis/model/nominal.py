@@ -63,7 +63,7 @@ def read_nominal(source: str | Path) -> dict[str, float]:
         source: `paper`, or a YAML file that holds them, by themselves (`jm: 0.02`) or under
             /rig/simulator as a ROS parameter file. Friction and k1 that it leaves out are zero: the
             datasheet lacks them. Without j and k0, or with an infinite k0, the axis is rigid, and
-            jm is all its inertia but for j, which may be zero.
+            jm is all its inertia but for j, which may be zero. With an infinite j the link is held.
 
     Raises:
         InputError: no such file, no simulator in it, an unknown name, an inertia or a stiffness
@@ -99,6 +99,11 @@ def datasheet(given: Mapping[str, object], where: str) -> dict[str, float]:
         raise InputError(
             f"{where}: {', '.join(missing)} missing; a flexible joint has jm, j and k0, a rigid "
             f"axis jm alone, and --nominal {PAPER} takes the paper's values."
+        )
+    if rigid and math.isinf(checked["j"]):
+        raise InputError(
+            f"{where}: j and k0 are both infinite, so that nothing could move; a rigid axis has j "
+            "in kg m2, a held link k0 in N m/rad."
         )
     refuse_effects(checked, where)
     lacking = dict.fromkeys(PLANT.names, 0.0) | ({"k0": math.inf} if rigid else {})

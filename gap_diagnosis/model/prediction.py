@@ -14,7 +14,6 @@ swing, since it is not late by it; what else a drive does to the torque, it does
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -111,15 +110,10 @@ def model_observer(
 
 
 def _growth(law: TransferFunction, nominal: Mapping[str, float], sample_rate_hz: float) -> float:
-    """Return the largest modulus of a pole of the loop of a first-order law and the linear model.
-
-    That of a free rotation of the link, which a rigid axis has besides, is left out.
-    """
-    a, b = linear.state_space(nominal)
+    """Return the largest modulus of a pole of a first-order law's loop with the linear model."""
+    a, b = linear.motor_side(nominal)
     position = np.zeros((1, len(a)))
-    position[0, 2] = 1.0
-    if math.isinf(nominal["k0"]):
-        a, b, position = a[2:, 2:], b[2:], position[:, 2:]
+    position[0, -2] = 1.0
     ad, bd, *_ = cont2discrete((a, b[:, None], position, np.zeros((1, 1))), 1.0 / sample_rate_hz)
     (b0, b1), (_, a1) = law.position, law.denominator
     # the law's state x: u = x + b0 e, then x = b1 e - a1 u, with e = -y

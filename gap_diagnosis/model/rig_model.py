@@ -12,6 +12,7 @@ import numpy as np
 from fjr_sim_node import effects as fx
 from fjr_sim_node import plant
 
+_OF_LINK = ("j", "fs", "fv")
 _MOST_STEPS, _MOST_STEPS_A_SAMPLE = 1e6, 20.0  # of the integration of one run
 
 
@@ -32,12 +33,15 @@ class Model:
         """Return the bare model with checked PLANT values.
 
         An infinite stiffness k0 means a rigid axis: motor and link are one body, of which only the
-        sums of inertia and friction count.
+        sums of inertia and friction count; an infinite link inertia j means a held link.
         """
         sums = plant.rigid_sums(values)
         if sums is not None:
             return cls(sums, {})
-        return cls({name: float(values[name]) for name in plant.PLANT.names}, {})
+        own = {name: float(values[name]) for name in plant.PLANT.names}
+        if math.isinf(own["j"]):
+            own = {name: value for name, value in own.items() if name not in _OF_LINK}
+        return cls(own, {})
 
     @property
     def rigid(self) -> bool:
@@ -55,9 +59,15 @@ class Model:
 
     @property
     def whole_plant(self) -> dict[str, float]:
-        """All bare parameters by the names of PLANT, those of a rigid axis as well."""
+        """All bare parameters by the names of PLANT, those of a rigid axis or held link as well."""
         none = dict.fromkeys(plant.PLANT.names, 0.0)
-        return {**none, "k0": math.inf, **self.plant}
+        held = {} if self.rigid else {"j": math.inf}
+        return {**none, "k0": math.inf, **held, **self.plant}
+
+    @property
+    def link_moves(self) -> bool:
+        """Whether it has a link that moves apart from the motor."""
+        return "j" in self.plant
 
     @property
     def rounds(self) -> bool:

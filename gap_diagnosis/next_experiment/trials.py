@@ -53,7 +53,7 @@ class Trial:
     def loaded(self, model: Model) -> Model:
         """Return a model with what the trial adds to the rig."""
         plant, effects = dict(model.plant), dict(model.effects)
-        body = "jm" if model.rigid else "j"
+        body = "j" if model.link_moves else "jm"
         plant[body] *= 1.0 + self.inertia
         if self.load_nm:
             there = effects.get("gravity.torque_nm", 0.0) * cmath.exp(

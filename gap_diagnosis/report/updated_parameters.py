@@ -44,11 +44,12 @@ def simulator_values(found: Mapping[str, float]) -> dict[str, float]:
     """Return the simulator's parameters from those of a diagnosis.
 
     What the bare plant lacked is in its own parameters then. A rigid axis is one body, whose
-    inertia and friction are the motor's.
+    inertia and friction are the motor's; a held link has neither.
     """
     light = plant.PLANT["j"].low
     rigid = {"j": light, "fs": 0.0, "fv": 0.0, "k0": math.inf, "k1": 0.0}
-    own = plant.with_added({**(rigid if "k0" not in found else {}), **found})
+    held = {"j": math.inf, "fs": 0.0, "fv": 0.0}
+    own = plant.with_added({**(rigid if "k0" not in found else held), **found})
     added = [e for e in effects.CATALOGUE if e.of_bare_plant]
     gone = {*plant.PLANT.names, *(name for effect in added for name in effect.names)}
     return {**own, **{name: value for name, value in found.items() if name not in gone}}

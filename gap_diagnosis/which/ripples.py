@@ -158,10 +158,11 @@ def of_pair(p: Mapping[str, float], frequency_hz: np.ndarray) -> np.ndarray:
     """Return the motor torque that acts as 1 N m on the motor against the link does, complex.
 
     Args:
-        p: the plant's parameters by name; without k0 the transmission is rigid.
+        p: the plant's parameters by name; without k0 the transmission is rigid, without j the link
+            is held.
         frequency_hz: float64 (n,).
     """
-    if "k0" not in p:
+    if "k0" not in p or "j" not in p:
         return np.ones(frequency_hz.size)
     s = 2j * np.pi * frequency_hz
     free = p["j"] * s**2 + p["fv"] * s

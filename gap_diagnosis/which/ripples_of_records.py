@@ -124,8 +124,7 @@ class RecordRipples:
         size = 2 * next_fast_len(samples, real=True)
         rate = self._evidence.records.sample_rate_hz
         frequency = np.maximum(rfftfreq(size, self._every / rate), _FREE_HZ)
-        plant = {"j": 0.0, "fs": 0.0, "fv": 0.0, "k0": np.inf, **model.plant}
-        plant_response = g0(plant, frequency, rate)
+        plant_response = g0(model.whole_plant, frequency, rate)
         holds = np.nan_to_num(self._evidence.simulator.response(frequency, index))
         response = plant_response / (1.0 + plant_response * holds)
         pair = np.array([np.ones(frequency.size), of_pair(model.plant, frequency)])

@@ -45,16 +45,18 @@ def possible_effects(nominal: Mapping[str, float]) -> list[str]:
 def _free(effect: fx.Effect, nominal: Mapping[str, float]) -> list[str]:
     """Return the names that a fit of an effect may set; empty if the rig cannot have it.
 
-    A rigid axis has nothing of transmission and link but what its one body has; friction is added
-    only where the nominal has none.
+    A rigid axis has nothing of transmission and link but what its one body has, and a held link
+    has nothing; friction is added only where the nominal has none.
     """
-    rigid = "k0" not in nominal
-    if not (effect.on_rigid_axis if rigid else effect.on_flexible_axis):
+    rigid, held = "k0" not in nominal, "j" not in nominal
+    if not (
+        effect.on_rigid_axis if rigid else effect.on_held_link if held else effect.on_flexible_axis
+    ):
         return []
     free = [
         name
         for name, p in zip(effect.names, effect.parameters, strict=True)
-        if not (rigid and p.of_link) and not (p.adds_to and nominal.get(p.adds_to))
+        if not ((rigid or held) and p.of_link) and not (p.adds_to and nominal.get(p.adds_to))
     ]
     return free if set(free) & set(effect.size_names) else []
 

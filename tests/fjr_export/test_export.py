@@ -20,6 +20,7 @@ from fjr_export.targets import MuJoCoJoint
 from fjr_export.treatments import TARGETS, TREATMENTS, table
 from fjr_interface.bags.writer import BagWriter
 from fjr_kit.document_tables import in_step
+from fjr_kit.errors import InputError
 from fjr_records.records import read_records
 from fjr_sim_node import effects
 
@@ -50,6 +51,11 @@ def write(folder: Path, **values: float) -> Path:
     text = "\n".join(["/rig/simulator:", "  ros__parameters:", *lines]) + "\n"
     file.write_text(text.replace(": inf", ": .inf"), encoding="utf-8")
     return file
+
+
+def test_a_held_link_is_refused_in_one_sentence(tmp_path):
+    with pytest.raises(InputError, match="j is infinite, a link that is held; give the inertia j"):
+        read_joint(write(tmp_path, jm=0.2, j=math.inf, k0=900.0))
 
 
 def test_every_target_treats_every_effect_and_the_document_says_how():

@@ -57,6 +57,20 @@ def test_the_simulated_loop_is_stable_just_below_the_margin_only(rate):
     assert growth[1] > 2.0
 
 
+@pytest.mark.parametrize(
+    ("named", "near"),
+    [({"k0": np.inf}, {"k0": 1e8, "j": VISCOUS["j"]}), ({"j": np.inf}, {"j": 1e7})],
+    ids=["rigid", "held link"],
+)
+def test_a_rigid_axis_and_a_held_link_have_the_margin_of_what_comes_near(named, near):
+    rigid, stiff = ({**VISCOUS, **values} for values in (named, near))
+    assert delay_margin(rigid, law(1000.0), 1000.0) > 2e-3
+    assert delay_margin(rigid, law(1000.0), 1000.0) == pytest.approx(
+        delay_margin(stiff, law(1000.0), 1000.0), rel=1e-4
+    )
+    assert spectral_radius(rigid, law(1000.0), 1000.0, 0.0) < 1.0
+
+
 def test_a_loop_that_is_unstable_or_never_will_be():
     assert delay_margin(VISCOUS, TransferFunction.of([1e6], [1.0]), 1000.0) == 0.0
     gentle = TransferFunction.of([1e-3], [1.0])

@@ -93,6 +93,15 @@ def test_what_a_datasheet_does_not_give_is_zero_and_an_inertia_alone_is_a_rigid_
     assert read_nominal(write(tmp_path, flexible)) == {**nothing, **flexible}
 
 
+def test_an_infinite_link_inertia_is_a_held_link_and_with_a_rigid_axis_refused(tmp_path):
+    given = {"jm": 0.2, "j": math.inf, "k0": 900.0, "fsm": 1.0}
+    held = Model.nominal(read_nominal(write(tmp_path, given)))
+    assert not held.rigid and not held.link_moves and held.whole_plant["j"] == math.inf
+    assert set(held.plant) == {"jm", "fsm", "fvm", "k0", "k1"}
+    with pytest.raises(InputError, match="nothing could move"):
+        read_nominal(write(tmp_path, {**given, "k0": math.inf}))
+
+
 def test_a_file_of_other_nodes_is_no_nominal(tmp_path):
     with pytest.raises(InputError, match="/rig/simulator is missing"):
         read_nominal(write(tmp_path, {"p": 200.0}, "controller"))

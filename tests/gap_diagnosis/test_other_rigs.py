@@ -35,6 +35,7 @@ LEAD_WITH_INTEGRATOR = {
     "torque_limit_nm": None,
 }
 RIGID = {"k0": math.inf, "k1": 0.0}
+HELD = {"j": math.inf}
 SMALL = {"levels_rad": (3e-3, 1e-2)}
 ANY_SCALES = Scales(100.0, 5.0, 0.05, 0.05, 1e-3, 50.0, 0.5, 300.0)
 
@@ -185,6 +186,43 @@ def test_motor_side_effects_of_a_rigid_axis_are_found(effect):
     for parameter, value in effect.items():
         assert found.best.model.effects[parameter] == pytest.approx(value, rel=0.05)
     assert not any(".link_" in parameter for parameter in found.best.space.effects)
+
+
+def test_a_held_link_stays_where_it_is():
+    held, heavy = (Model.nominal({**NOMINAL, **link}) for link in (HELD, {"j": 1e7}))
+    reference = simulate_case(seed=1, levels_rad=(1e-2,), realizations=1).recorded
+    (near, far), (torque, other) = zip(
+        *(Simulator(reference).signals(model) for model in (held, heavy)), strict=True
+    )
+    assert relative_rms(near, far) < 1e-6 and relative_rms(torque, other) < 1e-6
+    assert simulator_values(held.plant) == {**NOMINAL, **HELD, "fs": 0.0, "fv": 0.0}
+    frequency = np.linspace(0.5, 50.0, 100)
+    response = linear.continuous_g0({**NOMINAL, **HELD}, frequency)
+    s = 2j * np.pi * frequency
+    own = 1.0 / (NOMINAL["jm"] * s**2 + NOMINAL["fvm"] * s + NOMINAL["k0"])
+    assert np.allclose(response, own, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "effect",
+    [
+        {"hysteresis.torque_nm": 1.0, "hysteresis.displacement_rad": 5e-4},
+        {"stribeck_friction_motor.torque_nm": 2.0, "stribeck_friction_motor.velocity_rad_s": 0.05},
+        {"delay.time_s": 5e-4},
+    ],
+    ids=lambda effect: next(iter(effect)),
+)
+def test_effects_of_drive_and_transmission_are_found_before_a_held_link(effect):
+    case = simulate_case(effect, seed=7, plant=HELD, **SMALL)
+    name = next(iter(effect)).split(".")[0]
+    found, fitter = search(case.recorded, {**NOMINAL, **HELD}, name, "torque_bias", "cogging")
+    assert found.best.effects == (name,)
+    assert found.best.held_chi2 / fitter.held.size < 1.5
+    for parameter, value in effect.items():
+        assert found.best.model.effects[parameter] == pytest.approx(value, rel=0.05)
+    possible = set(catalogue({**found.best.model.plant}))
+    assert not possible & {"stribeck_friction_link", "extra_mode", "gravity", "cable"}
+    assert {"hysteresis", "backlash", "load_friction", "quadratic_friction"} <= possible
 
 
 def test_effects_of_transmission_and_link_are_not_looked_for_on_a_rigid_axis():
