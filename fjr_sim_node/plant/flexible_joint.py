@@ -42,13 +42,13 @@ from .stick_slip import (
 __all__ = ["FS", "FSM", "FV", "FVM", "JM", "K0", "K1", "PLANT", "J", "advance", "coefficients"]
 
 PLANT = ParameterGroup(
-    Parameter("jm", 0.2, "kg m2", "Motor inertia", 1e-6, 1e4, symbol="Jm", source="paper eq. 5"),
+    Parameter("jm", 0.2, "kg m2", "Motor inertia", 1e-9, 1e4, symbol="Jm", source="paper eq. 5"),
     Parameter(
         "j",
         0.3,
         "kg m2",
         "Link inertia; .inf: the link is held",
-        1e-6,
+        1e-9,
         symbol="J",
         source="paper eq. 5",
     ),

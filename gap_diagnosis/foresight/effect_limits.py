@@ -29,6 +29,7 @@ _MOST = 20.0  # times what the slope of a shape promises
 _LOOSE, _TIGHT = 5.0, 0.02  # limits of a drive that are tried, times the greatest torque
 _REFITTED = 0.9  # of what slopes promise must be left by a refit for them to count
 _TOLD = 0.5  # of an effect that another one must leave to be told from it, up to twice the limit
+_NEARER = 10.0  # times what slopes promise
 _NEAR = 0.1  # logarithm of the factor within which the end of a range is found
 _SCALED = ("size", "harmonic")
 
@@ -209,7 +210,10 @@ class EffectLimits:
         left = self._by_refit(shape, factor)
         shown = self._sight.strength(left) / self._showing
         if not _REFITTED < shown * slopes / factor < 1.0 / _REFITTED:
-            found = self._searched(shape, slopes, ends, self._by_refit)
+            # at its end a range may be beyond what shows: friction does what a wide dead band does
+            nearer = least, min(most, _NEARER * slopes)
+            tried = (self._searched(shape, slopes, r, self._by_refit) for r in (ends, nearer))
+            found = next((factor for factor in tried if factor is not None), None)
             if found is None:
                 return None
             factor = max(found, least)

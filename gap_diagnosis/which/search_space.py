@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from fjr_sim_node import effects as fx
+from fjr_sim_node.plant import PLANT
 
 from ..model.rig_model import Model
 from .scales import Scales
@@ -184,11 +185,12 @@ class Space:
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Return lower and upper bounds of a point."""
-        far = [
-            np.log1p(farthest(self.tolerance, _SCALES.get(name, _SCALE))) if value else 0.0
-            for name, value in self.nominal.items()
-        ]
-        low, high = [-f for f in far], far
+        low, high = [], []
+        for name, value in self.nominal.items():
+            far = np.log1p(farthest(self.tolerance, _SCALES.get(name, _SCALE))) if value else 0.0
+            within = PLANT[name]
+            low.append(max(-far, np.log(within.low / value)) if value and within.low else -far)
+            high.append(min(far, np.log(within.high / value)) if value else far)
         for name, unit in zip(self.effects, self.units, strict=True):
             parameter = fx.parameter(name)
             least, most = (parameter.low, parameter.high)

@@ -58,7 +58,7 @@ def test_values_may_stand_by_themselves(tmp_path):
     ("change", "words"),
     [
         ({"k00": 1500.0}, "'k00'; did you mean k0?"),
-        ({"jm": -0.2}, "jm must lie in [1e-06, 10000] kg m2, not -0.2"),
+        ({"jm": -0.2}, "jm must lie in [1e-09, 10000] kg m2, not -0.2"),
         ({"fs": "five"}, "fs must be a number in N m"),
         ({"k0": math.nan}, "k0 must be a number in N m/rad"),
         ({"backlash.half_gap_rad": 1e-3}, "backlash.half_gap_rad switches an effect on"),

@@ -11,7 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fjr_sim_node import effects as fx
-from gap_diagnosis.which.search_space import Scales, space_for, starts
+from fjr_sim_node.plant import PLANT
+from gap_diagnosis.which.search_space import Scales, Space, space_for, starts
 
 PAPER_LIKE = Scales(
     torque_nm=150.0, velocity_rad_s=8.0, angle_rad=0.065, deflection_rad=0.1,
@@ -47,6 +48,17 @@ def test_every_start_of_any_record_lies_within_the_bounds_of_its_fit(scales):
                 least, most = scales.bounds(name)
                 assert least <= value <= most, name
                 assert abs(value) >= scales.negligible(name) or value == 0.0, name
+
+
+def test_fits_do_not_leave_what_the_simulator_takes():
+    """A fit that ended beyond could not be written as parameters of a simulation."""
+    nominal = {"jm": 2e-9, "j": 3.0, "k0": 500.0, "fsm": 9e4, "k1": 0.0}
+    space = Space(nominal, (), (), 0.1, PAPER_LIKE)
+    for x in space.bounds():
+        for name, value in space.model(x).plant.items():
+            assert PLANT[name].low * (1.0 - 1e-12) <= value <= PLANT[name].high * (1.0 + 1e-12)
+    free = Space({"jm": 1.0}, (), (), 0.1, PAPER_LIKE).bounds()
+    assert free[1] == pytest.approx(-free[0]) and free[1] > 0.5
 
 
 def test_starts_follow_torque_velocity_and_angle_by_their_units():
