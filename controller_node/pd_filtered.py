@@ -19,7 +19,7 @@ from fjr_kit.compiled import inlined
 from fjr_kit.errors import InputError
 
 CONTROLLER = ParameterGroup(
-    Parameter("sample_rate_hz", 1000.0, "Hz", "Rate of the samples", 100.0, 20_000.0),
+    Parameter("sample_rate_hz", 1000.0, "Hz", "Rate of the samples", 1.0, 20_000.0),
     Parameter(
         "p", 200.0, "N m/rad", "Proportional gain", 0.0, 1e6, symbol="P", source="paper eq. 12"
     ),

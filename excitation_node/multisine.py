@@ -13,7 +13,7 @@ from fjr_interface.parameters import Parameter, ParameterGroup
 from fjr_kit.errors import InputError
 
 EXCITATION = ParameterGroup(
-    Parameter("sample_rate_hz", 1000.0, "Hz", "Rate of the samples", 100.0, 20_000.0),
+    Parameter("sample_rate_hz", 1000.0, "Hz", "Rate of the samples", 1.0, 20_000.0),
     Parameter("base_frequency_hz", 0.1, "Hz", "Line spacing f0; the period is 1/f0", 1e-3, 100.0),
     Parameter("f_min_hz", 0.1, "Hz", "Lowest excited frequency", 1e-3, 1e4),
     Parameter("f_max_hz", 50.0, "Hz", "Highest excited frequency", 1e-3, 1e4),

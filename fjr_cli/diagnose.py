@@ -98,10 +98,6 @@ def diagnose(
             command=command_line(),
             date=call_date(),
         )
-    print_summary(found.diagnosis, Console(), report.parent)
-    if found.diagnosis.parameters and not has_known_law(recorded):
-        typer.echo(
-            "Note: updated.yaml holds no controller, since the recorded one is unknown or no "
-            "pd_filtered law; fjr simulate would take the paper's."
-        )
+    runs = has_known_law(recorded)
+    print_summary(found.diagnosis, Console(), report.parent, runs=runs)
     typer.echo(report)

@@ -35,8 +35,15 @@ RANKED = 5
 """How many explanations the summary on the terminal shows."""
 
 
-def print_summary(diagnosis: Diagnosis, console: Console, out: Path) -> None:
-    """Print verdict, what it means, effects with parameters, gap and what a reader must see."""
+def print_summary(diagnosis: Diagnosis, console: Console, out: Path, *, runs: bool = True) -> None:
+    """Print verdict, what it means, effects with parameters, gap and what a reader must see.
+
+    Args:
+        diagnosis: the result.
+        console: where to.
+        out: the folder of the results.
+        runs: whether `updated.yaml` holds a controller, so that it can be simulated as it is.
+    """
     sure = f"(verdict: {diagnosis.verdict}, confidence {diagnosis.confidence:.0%})"
     _say(console, f"{headline(diagnosis)} {sure}")
     _say(console, f"{meaning(diagnosis)} {action(diagnosis)}")
@@ -62,7 +69,16 @@ def print_summary(diagnosis: Diagnosis, console: Console, out: Path) -> None:
         _say(console, f"Note: {note}")
     _say(console, f"When not to believe it: {WORDS[diagnosis.verdict].doubt}")
     if diagnosis.parameters and is_better(diagnosis):
-        _say(console, f"Better simulation: fjr simulate --rig {shlex.quote(str(out))}/updated.yaml")
+        place = f"{shlex.quote(str(out))}/updated.yaml"
+        if runs:
+            _say(console, f"Better simulation: fjr simulate --rig {place}")
+        else:
+            _say(
+                console,
+                f"Better simulation: {place}. It holds no controller, since the recorded one is "
+                "unknown or no pd_filtered law: add yours before fjr simulate, or take the joint "
+                "elsewhere by fjr export.",
+            )
 
 
 def _say(console: Console, sentence: str) -> None:

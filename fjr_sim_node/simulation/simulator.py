@@ -22,7 +22,7 @@ from .closed_loop import Trajectory, simulate
 SIMULATOR = ParameterGroup(
     *plant.PLANT,
     *effects.PARAMETERS,
-    Parameter("sample_rate_hz", 1000.0, "Hz", "Rate of the samples", 100.0, 20_000.0),
+    Parameter("sample_rate_hz", 1000.0, "Hz", "Rate of the samples", 1.0, 20_000.0),
     Parameter("noise_std_rad", 0.0, "rad", "Standard deviation of the encoder noise", 0.0, 10.0),
     Parameter(
         "noise_snr_db",

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from controller_node.pd_filtered import from_description
+from excitation_node import multisine
 from fjr_interface.experiment import Experiment
 from fjr_records.periodic import RecordedExperiment
 from fjr_records.records import RecordSet
@@ -16,6 +17,10 @@ from fjr_sim_node import effects, plant
 from fjr_sim_node.simulation.simulator import SIMULATOR
 
 from ..outcome.diagnosis import Diagnosis
+
+_LEAST_SAMPLES = 100  # of a period
+_HIGHEST = 0.4
+"""Highest frequency of a multisine over the sample rate."""
 
 
 def updated_values(
@@ -25,8 +30,8 @@ def updated_values(
 
     Simulator: refitted base parameters and all named effects, without encoder noise. Controller and
     sample rate: the recorded ones; no rate where the rig was recorded too slowly to be simulated.
-    Excitation, for steady periods only: grid, levels and periods of the record, so that a campaign
-    plays the same kind of signal, with phases of its own.
+    Excitation: of steady periods grid, levels and periods, so that a campaign plays the same kind
+    of signal, with phases of its own; of records what a multisine needs at their rate.
     """
     rate = _rate(recorded)
     simulator = simulator_values({name: float(e.value) for name, e in diagnosis.parameters.items()})
@@ -35,6 +40,8 @@ def updated_values(
     values: dict[str, dict[str, Any]] = {"simulator": {**played, **simulator}}
     if isinstance(recorded, RecordedExperiment):
         values["excitation"] = {"sample_rate_hz": rate, **_excitation(recorded)}
+    elif played:
+        values["excitation"] = {"sample_rate_hz": rate, **_multisine_at(rate)}
     if has_known_law(recorded):
         values["controller"] = from_description(_controller(recorded) or {}, rate)
     return values
@@ -91,6 +98,19 @@ def _excitation(recorded: RecordedExperiment) -> dict[str, Any]:
         "periods": description.periods,
         "transient_periods": description.transient_periods,
     }
+
+
+def _multisine_at(rate: float) -> dict[str, float]:
+    """Return which parameters of a multisine must differ from their defaults at a sample rate."""
+    usual = multisine.EXCITATION.defaults()
+    samples = max(round(rate / usual["base_frequency_hz"]), _LEAST_SAMPLES)
+    spacing = rate / samples
+    fitting = {
+        "base_frequency_hz": spacing,
+        "f_min_hz": max(usual["f_min_hz"], spacing),
+        "f_max_hz": min(usual["f_max_hz"], int(_HIGHEST * samples) * spacing),
+    }
+    return {name: value for name, value in fitting.items() if not math.isclose(value, usual[name])}
 
 
 def _amplitude(recorded: RecordedExperiment, level: int) -> float:

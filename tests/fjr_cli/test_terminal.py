@@ -126,6 +126,9 @@ def test_diagnose_says_causes_remainder_and_evidence_of_records_whole(console):
     diagnosis_summary.print_summary(diagnosis, console, Path("out"))
     text = " ".join(printed(console).split())
     assert text.startswith("Missing: gravity or torque bias; a remainder stays")
+    assert text.endswith("Better simulation: fjr simulate --rig out/updated.yaml")
+    diagnosis_summary.print_summary(diagnosis, console, Path("out"), runs=False)
+    assert "add yours before fjr simulate" in " ".join(printed(console).split())
     for said in (
         "97%", "61% (55 to 66%)", "8.06", "7.91 to 8.20", "142", "48.1", "19.3",
         "19% of the motion remains, 16% of the refit's squared gap.",

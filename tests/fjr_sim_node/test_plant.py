@@ -80,7 +80,7 @@ def test_every_rate_gives_the_motion_of_the_reference(rate):
     assert relative_error(states, exact).max() < 5e-5
 
 
-@pytest.mark.parametrize("rate", [100.0, 1000.0, 20_000.0])
+@pytest.mark.parametrize("rate", [5.0, 20.0, 100.0, 1000.0, 20_000.0])
 def test_linear_motion_is_the_matrix_exponential(rate):
     from scipy.linalg import expm
 

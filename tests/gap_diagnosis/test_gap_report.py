@@ -13,11 +13,14 @@ from gap_cases import simulate_case
 from html_page import EVIL, Page
 from plotly.offline import get_plotlyjs
 
+from controller_node import pd_filtered
 from fjr_bringup.campaign.plan import Campaign
+from fjr_interface.experiment import RecordDescription
 from fjr_interface.parameter_file import load_parameter_file
 from fjr_kit.errors import InputError
 from fjr_kit.plots import BARRED
 from fjr_records.noise import noise_levels
+from fjr_records.records import Record, RecordSet
 from fjr_sim_node.plant import PLANT
 from gap_diagnosis.gates.gate_checks import check_gates
 from gap_diagnosis.how_far.comparison import bla_distance_db, compare
@@ -299,6 +302,22 @@ def test_the_updated_file_is_a_campaign_of_the_better_simulation(found, tmp_path
     assert made.amplitude_rad == pytest.approx(1e-2)
     assert len(made.excited_harmonics) == len(recorded.excited_harmonics)
     assert load_parameter_file(out / "updated.yaml").keys() == values.keys()
+
+
+@pytest.mark.parametrize("rate", [7.0, 50.0, 250.5, 1000.0 / 3.0, 1000.0])
+def test_the_updated_file_of_records_is_a_campaign_at_their_rate(found, rate):
+    law = pd_filtered.describe(pd_filtered.CONTROLLER.check({}))
+    description = RecordDescription.of("log", sample_rate_hz=rate, controller=law)
+    still = np.zeros(100)
+    records = RecordSet("memory", rate, (Record("log", description, still, still, still, None),))
+    values = updated_values(records, found.diagnosis)
+    campaign = Campaign.create(overrides=values)
+    made = campaign.experiment(0, 0)
+    assert made.sample_rate_hz == rate
+    assert made.excited_harmonics[-1] * made.base_frequency_hz < 0.5 * rate
+    assert made.base_frequency_hz == pytest.approx(0.1, rel=0.35)
+    if rate == 1000.0:
+        assert values["excitation"] == {"sample_rate_hz": rate}
 
 
 def test_bad_data_is_reported_with_the_rig_alone(tmp_path):

@@ -11,6 +11,7 @@ import pytest
 from html_page import Page
 
 from controller_node import pd_filtered
+from fjr_bringup import Campaign
 from fjr_interface.bags.writer import BagWriter
 from fjr_interface.experiment import RecordDescription
 from fjr_interface.parameter_file import load_parameter_file
@@ -145,9 +146,11 @@ def test_the_json_is_true_of_its_schema(gravity):
     assert list(found["evidence"]) == schema["$defs"]["EvidenceKind"]["required"]
 
 
-def test_the_updated_file_holds_refit_cause_and_controller_and_no_excitation(gravity):
+def test_the_updated_file_holds_refit_cause_controller_and_the_rate_and_can_be_simulated(gravity):
     values = load_parameter_file(gravity.out / "updated.yaml")
-    assert set(values) == {"simulator", "controller"}
+    assert set(values) == {"simulator", "controller", "excitation"}
+    assert set(values["excitation"]) <= {"sample_rate_hz", "f_max_hz"}
+    assert Campaign.create(gravity.out / "updated.yaml").experiment(0, 0).sample_rate_hz == RATE_HZ
     simulator = values["simulator"]
     for name, estimate in gravity.diagnosis.parameters.items():
         assert simulator[name] == estimate.value
