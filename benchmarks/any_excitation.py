@@ -97,21 +97,30 @@ def judged(seed: int, linear: bool, seconds: float, noise: float) -> dict[str, R
     return rows
 
 
-def trapezoid(seed: int) -> tuple[float, float, int, int, int]:
-    """Return first and last frequency found, lines found and left out, and lines held."""
+def covered(held: np.ndarray, lines: np.ndarray) -> str:
+    """Return the share of lines that are held, with its standard error over rigs (jackknife)."""
+    share = held.sum() / lines.sum()
+    without = (held.sum() - held) / (lines.sum() - lines)
+    error = np.sqrt((held.size - 1) / held.size * np.sum((without - without.mean()) ** 2))
+    return f"{100.0 * share:.1f} +- {100.0 * error:.1f} %"
+
+
+def trapezoid(seed: int) -> tuple[float, float, int, int, int, int]:
+    """Return first and last frequency found, lines found, left out, reliable, and of these held."""
     rig = rigs.random_rig(seed, linear=True)
     record = rigs.record(rig, "trapezoid", 60.0, noise=0.01, seed=seed)
     found = arbitrary_bla([run_of([record], rigs.RATE)], rigs.RATE)
     f = found.bla.frequency_hz
     held = np.abs(found.bla.g - rigs.truth(rig, f)) <= found.bla.radius_95
-    return f[0], f[-1], f.size, found.left_out_hz.size, int(held.sum())
+    sure = found.bla.reliable
+    return f[0], f[-1], f.size, found.left_out_hz.size, int(sure.sum()), int(held[sure].sum())
 
 
 def main() -> None:
     """Measure and print."""
     print(describe() + "\n", flush=True)
     rig_count = 8 if "--quick" in sys.argv else 20
-    head = f"{'rig':8}{'s':>5}{'noise':>8}  {'excitation':26}{'discs hold':>11}{'lines':>7}"
+    head = f"{'rig':8}{'s':>5}{'noise':>8}  {'excitation':26}{'discs hold':>14}{'lines':>7}"
     print(head + f"{'left out':>10}{'radius':>9}{'error':>9}")
     with ProcessPoolExecutor(2) as pool:
         for linear, seconds, noise in CASES:
@@ -119,21 +128,21 @@ def main() -> None:
             found = [job.result() for job in jobs]
             for kind in found[0]:
                 rows = np.array([one[kind] for one in found])
-                held, lines, lost = rows[:, :3].sum(axis=0)
-                cover = f"{held / lines:.1%}" if kind in KINDS else ""
+                lines, lost = rows[:, 1:3].sum(axis=0)
+                cover = covered(rows[:, 0], rows[:, 1]) if kind in KINDS else ""
                 radius = f"{np.median(rows[:, 3]):.2%}" if kind in KINDS else ""
                 name = "linear" if linear else "friction"
                 print(
-                    f"{name:8}{seconds:5.0f}{noise:8g}  {kind:26}{cover:>11}{lines:7.0f}"
+                    f"{name:8}{seconds:5.0f}{noise:8g}  {kind:26}{cover:>14}{lines:7.0f}"
                     f"{lost:10.0f}{radius:>9}{np.nanmedian(rows[:, 4]):6.2f} dB",
                     flush=True,
                 )
         found = list(pool.map(trapezoid, range(rig_count)))
-    first, last, lines, lost, held = np.array(found).T
+    first, last, lines, lost, sure, held = np.array(found, float).T
     print(
         f"\ntrapezoid, {rig_count} linear rigs: {np.median(first):.2f} to {np.median(last):.1f} Hz "
-        f"(medians), {lines.sum():.0f} lines found, {lost.sum():.0f} left out, discs hold "
-        f"{held.sum() / lines.sum():.1%}"
+        f"(medians), {lines.sum():.0f} lines found, {lost.sum():.0f} left out, {sure.sum():.0f} "
+        f"reliable, whose discs hold {covered(held, sure)}"
     )
 
 
