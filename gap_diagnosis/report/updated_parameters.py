@@ -29,11 +29,12 @@ def updated_values(
     """Return the parameters of the better simulation by node.
 
     Simulator: refitted base parameters and all named effects, without encoder noise. Controller and
-    sample rate: the recorded ones; no rate where the rig was recorded too slowly to be simulated.
+    sample rate: the recorded ones, or the highest rate that nodes take; no rate where the rig was
+    recorded too slowly to be simulated.
     Excitation: of steady periods grid, levels and periods, so that a campaign plays the same kind
     of signal, with phases of its own; of records what a multisine needs at their rate.
     """
-    rate = _rate(recorded)
+    rate = min(_rate(recorded), SIMULATOR["sample_rate_hz"].high)
     simulator = simulator_values({name: float(e.value) for name, e in diagnosis.parameters.items()})
     SIMULATOR.check(simulator, "updated.yaml")
     played = {"sample_rate_hz": rate} if diagnosis.compared == "motion" else {}

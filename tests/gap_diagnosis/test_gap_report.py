@@ -304,7 +304,7 @@ def test_the_updated_file_is_a_campaign_of_the_better_simulation(found, tmp_path
     assert load_parameter_file(out / "updated.yaml").keys() == values.keys()
 
 
-@pytest.mark.parametrize("rate", [7.0, 50.0, 250.5, 1000.0 / 3.0, 1000.0])
+@pytest.mark.parametrize("rate", [7.0, 50.0, 250.5, 1000.0 / 3.0, 1000.0, 50_000.0])
 def test_the_updated_file_of_records_is_a_campaign_at_their_rate(found, rate):
     law = pd_filtered.describe(pd_filtered.CONTROLLER.check({}))
     description = RecordDescription.of("log", sample_rate_hz=rate, controller=law)
@@ -313,8 +313,8 @@ def test_the_updated_file_of_records_is_a_campaign_at_their_rate(found, rate):
     values = updated_values(records, found.diagnosis)
     campaign = Campaign.create(overrides=values)
     made = campaign.experiment(0, 0)
-    assert made.sample_rate_hz == rate
-    assert made.excited_harmonics[-1] * made.base_frequency_hz < 0.5 * rate
+    assert made.sample_rate_hz == min(rate, 20_000.0)
+    assert made.excited_harmonics[-1] * made.base_frequency_hz < 0.5 * made.sample_rate_hz
     assert made.base_frequency_hz == pytest.approx(0.1, rel=0.35)
     if rate == 1000.0:
         assert values["excitation"] == {"sample_rate_hz": rate}
