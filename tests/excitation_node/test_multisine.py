@@ -168,7 +168,7 @@ def test_a_list_of_amplitudes_shapes_the_spectrum():
         ({"realizations": 0}, ("realizations", "[1, 100000]")),
         ({"realizations": 1.5}, ("realizations", "whole number")),
         ({"periods": 0}, ("periods", "[1, 100000]")),
-        ({"sample_rate_hz": 50.0}, ("sample_rate_hz", "[100, 20000] Hz")),
+        ({"sample_rate_hz": 0.5}, ("sample_rate_hz", "[1, 20000] Hz")),
         ({"group": 1}, ("group", "[2, 100]")),
         ({"grid": "even"}, ("grid", "odd_random, odd, full")),
         ({"amplitude_rad": 1e-3}, ("amplitude_rad", "did you mean amplitudes_rad")),
