@@ -27,6 +27,7 @@ _SCALES = {"k1": 3.0}
 """How many factors of 1 + 3 TOLERANCE fits look away from a nominal value, where not two: k1 goes
 with the cube of the position."""
 
+_ROUNDING = 1e-12
 _AT_LIMIT = 0.01  # of the way from the nominal to the bound
 _LEAST_LINK = 0.4  # of its inertia that a third mass leaves it at a start
 
@@ -188,9 +189,9 @@ class Space:
         low, high = [], []
         for name, value in self.nominal.items():
             far = np.log1p(farthest(self.tolerance, _SCALES.get(name, _SCALE))) if value else 0.0
-            within = PLANT[name]
-            low.append(max(-far, np.log(within.low / value)) if value and within.low else -far)
-            high.append(min(far, np.log(within.high / value)) if value else far)
+            down, up = _within(name, value)
+            low.append(-min(far, down))
+            high.append(min(far, up))
         for name, unit in zip(self.effects, self.units, strict=True):
             parameter = fx.parameter(name)
             least, most = (parameter.low, parameter.high)
@@ -199,6 +200,18 @@ class Space:
             low.append(max(least / unit, -1e6))
             high.append(min(most / unit, 1e6))
         return np.array(low), np.array(high)
+
+
+def _within(name: str, value: float) -> tuple[float, float]:
+    """Return how far below and above a value the simulator takes a base parameter, logarithmic.
+
+    A little less, so that rounding leaves it within; the inertia of a rigid axis, which is a sum,
+    may lie above already.
+    """
+    low, high = PLANT[name].low, PLANT[name].high
+    down = np.log(value / low) if value and low else np.inf
+    up = np.log(high / value) if value else np.inf
+    return max(float(down) - _ROUNDING, 0.0), max(float(up) - _ROUNDING, 0.0)
 
 
 def space_for(
