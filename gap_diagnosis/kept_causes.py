@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
+from .judgement import FEWEST_PARTS
 from .outcome.verdict_words import explanation
-from .record_judgement import FEWEST_PARTS
 from .tested_causes import Tested, causes_with_tests
 from .which.cell_fits import CellFit, CellFitter
 from .which.found import Found

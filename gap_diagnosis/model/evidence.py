@@ -23,6 +23,7 @@ from .parts import Purpose, cut
 from .quasi_static import QuasiStaticSimulator, Stations
 from .record_rig import RecordSimulator
 from .rig_model import Model
+from .steady_runs import SteadyRuns
 
 WINDOWS = 24
 """Windows into which the shortest record is cut, at least; twice as many where a level has a single
@@ -62,7 +63,8 @@ class Evidence:
         self.slow = slow is not None
         self.records = records = records if slow is None else slow.records
         rate = records.sample_rate_hz
-        shortest = min(r.samples for r in records.records)
+        run_in = records.run_in if isinstance(records, SteadyRuns) else 0
+        shortest = min(r.samples for r in records.records) - run_in
         levels = [r.level for r in records.records]
         alone = any(levels.count(level) == 1 for level in levels)
         windows = 2 * WINDOWS if alone else WINDOWS
@@ -77,7 +79,8 @@ class Evidence:
             self.noise, self.lines = RecordNoise("none", math.nan), self.hop
             self.simulator = QuasiStaticSimulator(slow)
         else:
-            self.noise = record_noise(records)
+            known = records.noise if isinstance(records, SteadyRuns) else None
+            self.noise = known or record_noise(records)
             self.lines = self._lines_with_signal()
             top_hz = self.lines * self.line_hz
             self.simulator = RecordSimulator(records, self.noise, top_hz, nominal)
@@ -88,7 +91,7 @@ class Evidence:
             / np.maximum(np.abs(self.simulator.response(frequency, i)), 1e-300)
             for i, r in enumerate(records.records)
         ]
-        self.parts = tuple(cut(records, self.hop))
+        self.parts = tuple(cut(records, self.hop, run_in))
         self._band = np.searchsorted(self.edges, np.arange(self.lines), side="right") - 1
 
     def _lines_with_signal(self) -> int:

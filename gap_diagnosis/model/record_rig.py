@@ -7,7 +7,7 @@ drives the model, and an observer holds its motion to the recorded position (`pr
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,16 +15,22 @@ from controller_node.transfer_function import TransferFunction
 from fjr_kit.errors import InputError
 from fjr_records.record_noise import RecordNoise
 from fjr_records.records import Record, RecordSet
-from fjr_sim_node.simulation.closed_loop import Trajectory, simulate_law
+from fjr_sim_node.simulation import rig
+from fjr_sim_node.simulation.closed_loop import State, Trajectory, simulate_law
 
 from .prediction import CROSSOVER_SHARE, model_observer
 from .record_loop import RecordLoop, loop_of, without_erratic, without_swinging
 from .rig_model import Model, too_stiff
 from .simulated_rig import run_parallel
+from .steady_runs import SteadyRuns
 
 _SMALL = 1e-4  # relative: a change of an inertia that must not grow
 _AT_REST = 5.0  # standard deviations of noise that a record at rest may begin away from zero
 _FIRST_SAMPLES, _HIGHEST_DEGREE = 10, 4
+_SETTLED = (1e-6, 1e-4)
+"""Least and greatest part of the rms position that is left of a transient; between them the noise
+of a line, for a tail that lies in one line must not count there."""
+_SLOWER = 1.5  # times as long as it took the model that is simulated first
 _ONLY_NOISE = 1.1  # standard deviations that a fit to the first samples leaves by chance
 
 
@@ -41,6 +47,7 @@ class Drive:
         start: position (rad) and velocity (rad/s) that the encoder reads at the first sample.
         entry: state of the law before it; None for zero.
         elapsed_s: time since the first run began, for what drifts.
+        begin: state in which the simulation begins, whatever start and entry say.
     """
 
     reference: np.ndarray
@@ -50,6 +57,7 @@ class Drive:
     entry: np.ndarray | None = None
     elapsed_s: float = 0.0
     added: np.ndarray | None = None
+    begin: State | None = None
 
     @property
     def observed(self) -> bool:
@@ -72,7 +80,17 @@ class Drive:
         return simulate_law(
             self.reference, sample_rate_hz, p, self.law, None, e, self.elapsed_s,
             command=self.command, added=self.added, start=self.start, controller_state=self.entry,
+            begin=self.begin,
         )  # fmt: skip
+
+    def part(self, samples: slice, begin: State | None = None) -> Drive:
+        """Return what drives some samples of the run, from a state."""
+        command, added = (
+            None if signal is None else signal[samples] for signal in (self.command, self.added)
+        )
+        return replace(
+            self, reference=self.reference[samples], command=command, added=added, begin=begin
+        )
 
 
 class RecordSimulator:
@@ -109,7 +127,10 @@ class RecordSimulator:
         )
         self._entries = [self._entry(index) for index in range(len(records.records))]
         names = [r.name for r in records.records]
+        self._begins: dict[int, tuple[int, State]] = {}
         self.loop = without_erratic(self.loop, names, self._growth(Model.nominal(nominal)))
+        if isinstance(records, SteadyRuns):
+            self._begins = self._near_steady(Model.nominal(nominal), records.run_in, noise)
 
     def _entry(self, index: int) -> np.ndarray | None:
         """Return the state in which the law of a run enters it; None for zero."""
@@ -129,6 +150,48 @@ class RecordSimulator:
             moved = float(np.sqrt(np.mean(one[0] ** 2))) + 1e-300
             growth[index] = change / moved / _SMALL if np.isfinite(change) else np.inf
         return growth
+
+    def _near_steady(
+        self, nominal: Model, run_in: int, noise: RecordNoise
+    ) -> dict[int, tuple[int, State]]:
+        """Return where runs may begin that lead to a steady period, and in which state.
+
+        A model that is near to the nominal is sooner in its steady state from that one's than from
+        rest, unless it remembers for longer.
+        """
+        std = noise.std_rad if noise.known else 0.0
+        indices = range(len(self.records.records))
+        begins = run_parallel(lambda index: self._begin_near(nominal, index, run_in, std), indices)
+        return {i: begin for i, begin in zip(indices, begins, strict=True) if begin is not None}
+
+    def _begin_near(
+        self, model: Model, index: int, run_in: int, noise_rad: float
+    ) -> tuple[int, State] | None:
+        """Return from which sample on a run has to be simulated, and the state before.
+
+        How long before the steady period says the model's own way from rest: when its first period
+        has come near the last one, nearer where there is less noise.
+        """
+        drive, samples = self.drive(index), self.records.records[index].samples
+        period = samples - run_in
+        if self.too_stiff(model, index):
+            return None
+        try:
+            first = drive.simulated(self._rate, *_coefficients(model))
+            off = np.abs(first.position[:period] - first.position[run_in:])
+            rms = float(np.std(first.position[run_in:]))
+            limit = min(max(noise_rad / period**0.5, _SETTLED[0] * rms), _SETTLED[1] * rms)
+            settled = int(_SLOWER * np.flatnonzero(np.append(True, off > limit))[-1])
+            begin = run_in - settled
+            if begin <= 0:
+                return None
+            until = drive.part(slice(begin)).simulated(self._rate, *_coefficients(model))
+        except InputError:
+            return None
+        now = drive.elapsed_s + begin / self._rate
+        middle = float(first.motor[run_in:].mean())
+        rig.complete(until.end.rig, float(until.torque[-1]), now, middle)
+        return begin, until.end
 
     def response(self, frequency_hz: np.ndarray, index: int) -> np.ndarray:
         """Return C_y of what holds a run: its controller, or the observer; complex, N m/rad."""
@@ -188,11 +251,21 @@ class RecordSimulator:
         model, index = job
         if self.too_stiff(model, index):
             return np.full((3, self.records.records[index].samples), np.nan)
+        drive, samples = self.drive(index), self.records.records[index].samples
+        first, state = (0, None) if model.settles_slowly else self._begins.get(index, (0, None))
+        if state is not None:
+            drive = drive.part(slice(first, None), state)
         try:
-            run = self.drive(index).simulated(self._rate, *_coefficients(model))
+            run = drive.simulated(self._rate, *_coefficients(model))
         except InputError:
-            return np.full((3, self.records.records[index].samples), np.nan)
-        return np.array([run.position, run.torque, run.motor if model.rigid else run.link])
+            return np.full((3, samples), np.nan)
+        signals = np.array([run.position, run.torque, run.motor if model.rigid else run.link])
+        if first == 0:
+            return signals
+        record = self.records.records[index]
+        before = record.position if record.link is None else record.link
+        head = np.array([record.position, record.torque, before])[:, :first]
+        return np.concatenate([head, signals], axis=1)
 
     def too_stiff(self, model: Model, index: int) -> bool:
         """Tell whether a model would take so long to play as no record can call for."""

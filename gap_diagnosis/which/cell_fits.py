@@ -23,7 +23,7 @@ from ..model.rig_model import Model
 from .cell_weights import CellWeights
 from .from_parts import from_part
 from .least_squares import Solution, solve
-from .ripples_of_records import RecordRipples
+from .ripples import Ripples
 from .scales import Scales
 from .screening import LARGEST, LARGEST_OF_TORQUES, Proposal, Screening
 from .search_space import Space, space_for, starts
@@ -35,6 +35,8 @@ _ADDED_ROUNDS = (6, 4)
 _LEAST_PROMISE = 20.0  # a start that gains less than this (twice the nats) is not pursued
 _STARTS = 2
 RIPPLES_TRIED = 3
+NOTHING_LEFT = 2.0
+"""Mean squared error over noise below which noise explains what is left."""
 _RIVAL = 0.05  # an error: a second start that costs so much more than the first is not pursued
 _ACTS = (
     0.1  # of what is left in a band of a part: an effect that moves it by less does not act there
@@ -82,7 +84,7 @@ class CellFitter:
     def __init__(self, evidence: Evidence, nominal: Mapping[str, float], tolerance: float) -> None:
         """Prepare."""
         self.evidence, self.nominal, self.tolerance = evidence, dict(nominal), tolerance
-        self._rippled: tuple[CellFit, tuple[RecordRipples, SeenTorques]] | None = None
+        self._rippled: tuple[CellFit, tuple[Ripples, SeenTorques]] | None = None
         self.weights = CellWeights(evidence)
         self.fit_parts, self.select_parts = self.weights.fit_parts, self.weights.select_parts
         self.groups, self.runs = evidence.stretch_of(self.fit_parts), self.weights.runs
@@ -257,11 +259,11 @@ class CellFitter:
         alone = beside_scatter(errors, weight, self.weights.unseen)
         return self.weights.mean_squares(alone) + self.weights.select_floor
 
-    def _ripples(self, parent: CellFit) -> tuple[RecordRipples, SeenTorques]:
+    def _ripples(self, parent: CellFit) -> tuple[Ripples, SeenTorques]:
         if self._rippled is None or self._rippled[0] is not parent:
             weight, solution = self.weights.weight(parent.variance), parent.solution
             at = self.evidence, self.fit_parts, parent.model
-            self._rippled = parent, (RecordRipples(*at, weight, solution), SeenTorques(*at))
+            self._rippled = parent, (Ripples(*at, weight, solution), SeenTorques(*at))
         return self._rippled[1]
 
     def _space(self, parent: CellFit, seed: Mapping[str, float]) -> Space:

@@ -1,4 +1,4 @@
-"""Records: what a change of the model would change of the evidence in windows and lines."""
+"""What a change of the model would change of the evidence in windows and lines."""
 
 from __future__ import annotations
 
@@ -12,33 +12,42 @@ from fjr_records.records import RecordSet
 
 from ..model.evidence import Evidence
 from ..model.rig_model import Model
+from ..which.cell_fits import NOTHING_LEFT
 from ..which.gains import LEAST_GAIN
 from ..which.scales import Scales
-from ..which.stepwise import NOTHING_LEFT
 
 RECORDS = 3
 """Records of each level that are simulated: one for each purpose of a diagnosis."""
 
 
-class RecordSight:
-    """What records show.
+class Sight:
+    """What runs show.
 
     Attributes:
+        levels: names of their levels.
         scales: what is usual in them.
         noise_known: whether their noise is known.
     """
 
-    def __init__(self, records: RecordSet, nominal: Model, realizations: int | None = None) -> None:
-        """Take records.
+    def __init__(
+        self,
+        records: RecordSet,
+        nominal: Model,
+        levels: Sequence[str],
+        realizations: int | None = None,
+    ) -> None:
+        """Take runs.
 
         Args:
             records: at least those that stand for all.
             nominal: the bare plant.
+            levels: their names.
             realizations: how many each level will have; None for those that are there.
 
         Raises:
             InputError: a controller that is described badly.
         """
+        self.levels = tuple(levels)
         members = {at: [r for r in records.records if r.level == at] for at in records.levels}
         chosen = [r for runs in members.values() for r in runs[:RECORDS]]
         records = replace(records, records=tuple(chosen))
@@ -66,11 +75,6 @@ class RecordSight:
         _, self._bins = np.unique(part[self._judged] * bands + cell[self._judged] % bands,
                                   return_inverse=True)  # fmt: skip
         self._count = len(judged)
-
-    @property
-    def levels(self) -> tuple[str, ...]:
-        """Names of the levels."""
-        return tuple(f"level {level}" for level in self._evidence.records.levels)
 
     def errors(self, models: Sequence[Model]) -> np.ndarray:
         """Return errors over their standard deviation, float64 (models, errors)."""
