@@ -6,6 +6,7 @@ drives the model, and an observer holds its motion to the recorded position (`pr
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -57,7 +58,11 @@ class Drive:
         return self.command is not None
 
     def simulated(
-        self, sample_rate_hz: float, p: tuple[float, ...], e: np.ndarray | None
+        self,
+        sample_rate_hz: float,
+        p: tuple[float, ...],
+        e: np.ndarray | None,
+        noise: np.ndarray | None = None,
     ) -> Trajectory:
         """Return the simulated run of a rig.
 
@@ -65,12 +70,13 @@ class Drive:
             sample_rate_hz: rate of the samples.
             p: from `plant.coefficients`.
             e: from `effects.coefficients`, or None.
+            noise: of the encoder, (samples,) in rad; None for none.
 
         Raises:
             InputError: the motion diverged.
         """
         return simulate_law(
-            self.reference, sample_rate_hz, p, self.law, None, e, self.elapsed_s,
+            self.reference, sample_rate_hz, p, self.law, noise, e, self.elapsed_s,
             command=self.command, added=self.added, start=self.start, controller_state=self.entry,
         )  # fmt: skip
 
@@ -100,6 +106,8 @@ class RecordSimulator:
         """
         self.records = records
         self._rate = records.sample_rate_hz
+        self._added: Sequence[np.ndarray] | None = None
+        self._named = False
         self.loop: RecordLoop = without_swinging(loop_of(records), records)
         self._starts = [_start(r, noise) for r in records.records]
         self._speeds = [float(np.std(np.diff(r.position)) * self._rate) for r in records.records]
@@ -110,6 +118,32 @@ class RecordSimulator:
         self._entries = [self._entry(index) for index in range(len(records.records))]
         names = [r.name for r in records.records]
         self.loop = without_erratic(self.loop, names, self._growth(Model.nominal(nominal)))
+
+    def adding(self, signals: Sequence[np.ndarray] | None) -> RecordSimulator:
+        """Return a simulator that adds signals to y, u and q of models whose encoder is smooth.
+
+        Args:
+            signals: what rounding adds on the average to each run, float64 (3, samples); None for
+                nothing.
+        """
+        other = copy.copy(self)
+        other._added, other._named = signals, False
+        return other
+
+    def naming(self) -> RecordSimulator:
+        """Return a simulator that adds the same to models whose encoder rounds, and to no others.
+
+        It plays these with a smooth encoder: no rounding that is simulated is that of the record,
+        sample by sample.
+        """
+        other = copy.copy(self)
+        other._named = True
+        return other
+
+    @property
+    def adds(self) -> bool:
+        """Whether it adds what rounding does."""
+        return self._added is not None
 
     def _entry(self, index: int) -> np.ndarray | None:
         """Return the state in which the law of a run enters it; None for zero."""
@@ -162,7 +196,7 @@ class RecordSimulator:
         model, index = job
         record = self.records.records[index]
         try:
-            run = self._observed(index).simulated(self._rate, *_coefficients(model))
+            run = self._observed(index).simulated(self._rate, *self._coefficients(model))
             return run.torque - record.torque
         except InputError:
             return np.full(record.samples, np.nan)
@@ -184,24 +218,45 @@ class RecordSimulator:
             record.position, self._observer, record.torque, start, elapsed_s=record.elapsed_s
         )
 
+    def disturbed(self, model: Model, index: int, noise: np.ndarray) -> np.ndarray:
+        """Return y, u and q of a model in one run, to which nothing is added, with encoder noise.
+
+        Args:
+            model: the model.
+            index: of the run.
+            noise: (samples,), rad.
+
+        Returns:
+            float64 (3, samples); NaN where the motion diverges.
+        """
+        try:
+            drive = self.drive(index)
+            run = drive.simulated(self._rate, *self._coefficients(model), noise)
+        except InputError:
+            return np.full((3, self.records.records[index].samples), np.nan)
+        return np.array([run.position, run.torque, run.motor if model.rigid else run.link])
+
     def _one(self, job: tuple[Model, int]) -> np.ndarray:
         model, index = job
         if self.too_stiff(model, index):
             return np.full((3, self.records.records[index].samples), np.nan)
         try:
-            run = self.drive(index).simulated(self._rate, *_coefficients(model))
+            run = self.drive(index).simulated(self._rate, *self._coefficients(model))
         except InputError:
             return np.full((3, self.records.records[index].samples), np.nan)
-        return np.array([run.position, run.torque, run.motor if model.rigid else run.link])
+        out = np.array([run.position, run.torque, run.motor if model.rigid else run.link])
+        if self._added is None or model.rounds != self._named:
+            return out
+        return out + self._added[index]
+
+    def _coefficients(self, model: Model) -> tuple[tuple[float, ...], np.ndarray | None]:
+        played = model.smooth if self._named else model
+        return played.plant_coefficients, played.effect_coefficients
 
     def too_stiff(self, model: Model, index: int) -> bool:
         """Tell whether a model would take so long to play as no record can call for."""
         samples = self.records.records[index].samples
         return too_stiff(model, samples, self._rate, self._speeds[index], self._torques[index])
-
-
-def _coefficients(model: Model) -> tuple[tuple[float, ...], np.ndarray | None]:
-    return model.plant_coefficients, model.effect_coefficients
 
 
 def _start(record: Record, noise: RecordNoise) -> tuple[float, float]:
