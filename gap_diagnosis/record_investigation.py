@@ -13,6 +13,7 @@ import numpy as np
 from fjr_records.driven import wrong_sign
 from fjr_records.records import RecordSet
 
+from .coarse_encoder import with_coarse_encoder
 from .gates.bag_deviations import GROUPS
 from .gates.bags_gate import as_bags, drift_of_runs, record_changes, scattering
 from .how_far.record_ledger import Ledger
@@ -24,7 +25,7 @@ from .model.record_length import within
 from .model.rig_model import Model
 from .notes import at_limits
 from .outcome.diagnosis import Bags, Diagnosis
-from .outcome.verdict_words import OUT_OF_TIME
+from .outcome.verdict_words import OUT_OF_TIME, ROUNDING
 from .record_judgement import judge_records
 from .tested_causes import Tested
 from .torque_timing import Timing, timed
@@ -34,6 +35,7 @@ from .which.equivalents import founded, partners
 from .which.estimates import moved_by_scatter, relative_scatter
 from .which.found import Found
 from .which.gains import gain, stands_for
+from .which.record_rounding import beside_rounding
 from .which.search_space import TOLERANCE
 from .which.stepwise import Stepwise
 from .which.unseen_friction import SCATTER
@@ -120,6 +122,8 @@ def investigate_records(
         records, cut = within(records)
         progress("windows and noise")
         timing = timed(records, nominal, tolerance, progress)
+        fitter, refit = beside_rounding(timing.fitter, timing.refit, progress)
+        timing = replace(timing, fitter=fitter, refit=refit)
     else:
         cut = []
         progress("torque of the slow motion")
@@ -146,6 +150,8 @@ def investigate_records(
     progress("judgement")
     notes = [*records.notes, *cut, *heard, *_notes(evidence, found)]
     diagnosis = judge_records(fitter, model, found, tested, alternatives, bags, scatter, notes)
+    if effects is None or ROUNDING in effects:
+        fitter, found, diagnosis = with_coarse_encoder(fitter, model, found, diagnosis)
     return RecordInvestigation(fitter, model, found, tuple(tested), diagnosis)
 
 
