@@ -70,6 +70,11 @@ class RecordNoise:
         """Whether any noise is known, so that something can be significant."""
         return self.source != "none"
 
+    @property
+    def rounds(self) -> bool:
+        """Whether what counts as noise is what the encoder rounds away, since no more is seen."""
+        return self.step_rad is not None and self.std_rad <= self.step_rad / math.sqrt(12.0)
+
     def power(self, cycles: np.ndarray) -> np.ndarray:
         """Return the variance of a line of an orthonormal transform (rad2), of the shape of cycles.
 

@@ -25,7 +25,7 @@ from .outcome.verdict_words import ROUNDING
 from .record_judgement import FEWEST_PARTS, PLAIN
 from .which.cell_fits import CellFit, CellFitter
 from .which.found import Found
-from .which.record_rounding import STEP, rounds_most, step_of, with_step
+from .which.record_rounding import STEP, step_of, with_step
 from .which.stepwise import NOTHING_LEFT
 
 _CERTAIN = 60.0
@@ -33,6 +33,10 @@ _CERTAIN = 60.0
 _ALONE, _BESIDE = 1.25, 2.0
 """Least ratio of the misfit by noise alone to that by noise and rounding: where nothing else is
 named, and beside other causes."""
+_BY_CHANCE = {False: 1.0, True: 0.5}
+"""Misfit that noise and rounding leave by chance, at the least: where rounding is simulated, the
+noise that is seen is in part made by the same counts, and stands twice in their variance."""
+_OFF = 1e-3  # of the step, which is known better than that
 _LEAST_PRESENT, _MOST_PRESENT = 0.5, 0.99
 
 
@@ -42,7 +46,7 @@ class _Misfits:
 
     Attributes:
         by_noise: over the noise that is seen without rounding.
-        by_both: over noise and rounding.
+        by_both: over noise and rounding; at least what that leaves by chance.
         apart: the same beside friction that scatters from run to run, as the search counts.
         numbers: how many errors there are.
     """
@@ -52,22 +56,18 @@ class _Misfits:
     apart: float
     numbers: int
 
-    @property
-    def ratio(self) -> float:
-        """How many times more is left by noise alone; what is less than noise is not less."""
-        return self.by_noise / max(self.by_both, 1.0)
-
     def present(self, beside: bool) -> float:
         """Return the probability that rounding is what is left; 0 where it is not named.
 
         Args:
             beside: whether other causes are named.
         """
+        ratio = self.by_noise / self.by_both
         much = self.by_noise >= NOTHING_LEFT and self.apart < PLAIN
         certain = (self.by_noise - self.by_both) * self.numbers >= _CERTAIN
-        if not much or not certain or self.ratio < (_BESIDE if beside else _ALONE):
+        if not much or not certain or ratio < (_BESIDE if beside else _ALONE):
             return 0.0
-        found = (1.0 - 0.5 / self.ratio) * min(NOTHING_LEFT / self.apart, 1.0)
+        found = (1.0 - 0.5 / ratio) * min(NOTHING_LEFT / self.apart, 1.0)
         return min(found, _MOST_PRESENT) if found >= _LEAST_PRESENT else 0.0
 
 
@@ -87,7 +87,7 @@ def with_coarse_encoder(
     """
     evidence, noise, best = fitter.evidence, fitter.evidence.noise, found.best
     few = len(evidence.parts_for("select")) < FEWEST_PARTS
-    if few or evidence.slow or not rounds_most(noise) or math.isnan(noise.seen_rad):
+    if few or evidence.slow or not noise.rounds or math.isnan(noise.seen_rad):
         return fitter, found, diagnosis
     present = _misfits(fitter, best).present(bool(best.effects))
     if not present:
@@ -111,8 +111,10 @@ def _misfits(fitter: CellFitter, best: CellFit) -> _Misfits:
     def left(evidence: Evidence) -> float:
         return Ledger(evidence, parts).step(best.model, None, "refit").chi2_per_dof or 0.0
 
+    least = _BY_CHANCE[evidence.player.adds]
+    both = max(left(evidence), least)
     numbers = int(fitter.weights.counts.sum())
-    return _Misfits(left(_by_noise_alone(evidence)), left(evidence), fitter.misfit(best), numbers)
+    return _Misfits(left(_by_noise_alone(evidence)), both, fitter.misfit(best), numbers)
 
 
 def _with_step(fit: CellFit, step: float) -> CellFit:
@@ -191,7 +193,7 @@ def _told(
 def _known(rounded: Model) -> dict[str, Estimate]:
     """Return the step of the encoder, which the record shows as it is."""
     step = rounded.effects[STEP]
-    return {STEP: Estimate(value=step, low=step, high=step)}
+    return {STEP: Estimate(value=step, low=(1.0 - _OFF) * step, high=(1.0 + _OFF) * step)}
 
 
 def _gap(step: Step) -> Gap:

@@ -122,8 +122,8 @@ def investigate_records(
         records, cut = within(records)
         progress("windows and noise")
         timing = timed(records, nominal, tolerance, progress)
-        fitter, refit = beside_rounding(timing.fitter, timing.refit, progress)
-        timing = replace(timing, fitter=fitter, refit=refit)
+        fitter, begun_with = beside_rounding(timing.fitter, Found([timing.refit]), progress)
+        timing = replace(timing, fitter=fitter, refit=begun_with.best)
     else:
         cut = []
         progress("torque of the slow motion")
@@ -137,7 +137,10 @@ def investigate_records(
         timing = other
         progress(f"search with a torque that is {'' if timing.held else 'not '}held")
         found = _searched(timing, names, progress, until)
-    fitter, evidence, heard = timing.fitter, timing.fitter.evidence, [*timing.notes]
+    fitter = timing.fitter
+    if found.best.effects:
+        fitter, found = beside_rounding(fitter, found, progress)
+    evidence, heard = fitter.evidence, [*timing.notes]
     progress("scatter from run to run")
     bags, scatter, said = _run_scatter(fitter, found.best)
     heard += said

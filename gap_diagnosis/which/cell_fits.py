@@ -250,7 +250,8 @@ class CellFitter:
         """
         return self.weights.gained(after.left, before.left).sum(axis=1)
 
-    def _left(self, model: Model, variance: np.ndarray) -> np.ndarray:
+    def left_by(self, model: Model, variance: np.ndarray) -> np.ndarray:
+        """Return `CellFit.left` of a model, with weights by such variances of the cells, rad2."""
         others = deviated(model) if self.weights.unseen else []
         errors = self.evidence.errors([model, *others], self.select_parts)
         weight = self.weights.select_weight(variance)
@@ -304,4 +305,4 @@ class CellFitter:
         left = errors * self.weights.weight(variance)
         ended = replace(solution, residuals=left, jacobian=known, cost=float(left @ left))
         model = space.model(x)
-        return CellFit(effects, space, model, ended, variance, self._left(model, variance))
+        return CellFit(effects, space, model, ended, variance, self.left_by(model, variance))

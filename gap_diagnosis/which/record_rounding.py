@@ -12,12 +12,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-
-from fjr_records.record_noise import RecordNoise
 
 from ..model.evidence import Evidence
 from ..model.lapped import lapped
@@ -25,6 +23,7 @@ from ..model.rig_model import Model
 from ..model.simulated_rig import run_parallel
 from ..outcome.verdict_words import ROUNDING
 from .cell_fits import CellFit, CellFitter
+from .found import Found
 from .stepwise import NOTHING_LEFT
 
 Progress = Callable[[str], None]
@@ -33,7 +32,10 @@ STEP = f"{ROUNDING}.resolution_rad"
 """Name of the step of the encoder."""
 _FEW_COUNTS = 30.0
 """Of the rms motion: rounding that is finer acts as white noise."""
-_ROUNDS = 3  # of simulating what rounding adds to the refit, and fitting it anew
+_ROUNDS = 3  # of simulating what rounding adds to the best fit, and fitting it anew
+_NEAR = 4.0
+"""Misfit by noise and rounding above which a model misses so much that it cannot say what rounding
+adds: two standard deviations of rounding, more than half a step."""
 _SIMULATED = 8  # simulations of each run that round
 _DITHER = 0.05  # of a step: noise that makes the simulations take other counts
 _OFF_GRID = 0.01  # of a step: counts of the simulator are multiples of it
@@ -58,37 +60,50 @@ class Rounded:
 
 
 def beside_rounding(
-    fitter: CellFitter, refit: CellFit, progress: Progress = lambda _: None
-) -> tuple[CellFitter, CellFit]:
-    """Return what fits a motion of few counts, and its refit, if that comes nearer to the records.
+    fitter: CellFitter, found: Found, progress: Progress = lambda _: None
+) -> tuple[CellFitter, Found]:
+    """Return what fits a motion of few counts, and its fits, if these come nearer to the records.
 
-    What rounding adds is simulated with the refit, which is fitted anew beside it. The noise is
-    then what was seen and what rounding scatters; where none was seen, white rounding at the least.
+    What rounding adds is simulated with the best fit, and all are fitted anew beside it. The noise
+    is then what was seen and what rounding scatters. A model that misses more than about half a
+    step cannot say what rounding adds.
 
     Args:
-        fitter: for which rounding is white noise.
-        refit: fit of the base parameters alone.
+        fitter: of the fits.
+        found: the refit of the base parameters, and perhaps causes.
         progress: told that rounding is simulated.
     """
-    chosen = fitter, refit
+    chosen = fitter, found
     if not in_few_counts(fitter.evidence):
         return chosen
     yardstick = fitter.weights.select_floor  # of all rounds: noise that grows is not nearer
-    least = np.sum(_squares(fitter, refit) / yardstick)
+    least = np.sum(_squares(fitter, found.best) / yardstick)
     for number in range(_ROUNDS):
-        if number and chosen[0].misfit(chosen[1]) < NOTHING_LEFT:
+        before, fits = chosen
+        if number and before.misfit(fits.best) < NOTHING_LEFT:
             break
         progress("rounding in the loop")
-        rounded = in_the_loop(fitter.evidence, chosen[1].model)
+        rounded = in_the_loop(before.evidence, fits.best.model)
         if not rounded.finite:
             break
-        other = CellFitter(_evidence(fitter.evidence, rounded), fitter.nominal, fitter.tolerance)
-        again = other.refit()
-        left = np.sum(_squares(other, again) / yardstick)
+        after, again = _fitted_anew(before, fits, rounded)
+        left = np.sum(_squares(after, again.best) / yardstick)
         if not left < least:
             break
-        chosen, least = (other, again), left
-    return chosen
+        chosen, least = (after, again), left
+    return chosen if chosen[0].misfit(chosen[1].best) < _NEAR else (fitter, found)
+
+
+def _fitted_anew(fitter: CellFitter, found: Found, rounded: Rounded) -> tuple[CellFitter, Found]:
+    """Return what fits beside rounding, and steps fitted anew; rivals stay, and are judged anew."""
+    evidence = fitter.evidence
+    other = CellFitter(_evidence(evidence, rounded), fitter.nominal, fitter.tolerance)
+    steps = [other.refit(), *(other.taken_over(fit) for fit in found.steps[1:])]
+    rivals = {
+        count: [replace(f, left=other.left_by(f.model, f.variance)) for f in fits]
+        for count, fits in found.rivals.items()
+    }
+    return other, replace(found, steps=steps, rivals=rivals)
 
 
 def in_few_counts(evidence: Evidence) -> bool:
@@ -96,18 +111,13 @@ def in_few_counts(evidence: Evidence) -> bool:
 
     Only where rounding is more than the noise, and counts lie where those of the simulator do.
     """
-    if evidence.slow or not rounds_most(evidence.noise) or None in evidence.player.loop.laws:
+    if evidence.slow or not evidence.noise.rounds or None in evidence.player.loop.laws:
         return False
     positions = [record.position for record in evidence.records.records]
     step = step_of(evidence)
     counts = np.array([position[0] for position in positions]) / step
     on_grid = float(np.abs(counts - np.rint(counts)).max()) < _OFF_GRID
     return on_grid and min(float(np.std(p)) for p in positions) < _FEW_COUNTS * step
-
-
-def rounds_most(noise: RecordNoise) -> bool:
-    """Tell whether what counts as noise is what the encoder rounds away, since less was seen."""
-    return noise.step_rad is not None and noise.std_rad <= noise.step_rad / math.sqrt(12.0)
 
 
 def step_of(evidence: Evidence) -> float:
@@ -147,14 +157,12 @@ def in_the_loop(evidence: Evidence, model: Model) -> Rounded:
     return Rounded(added, (1.0 + 1.0 / _SIMULATED) * by_band.ravel())
 
 
-def _evidence(white: Evidence, rounded: Rounded) -> Evidence:
+def _evidence(evidence: Evidence, rounded: Rounded) -> Evidence:
     """Return the evidence beside simulations to which is added what rounding does."""
-    seen = white.noise.seen_rad
-    if math.isnan(seen):
-        power = np.maximum(rounded.power, white.noise_power)
-    else:
-        power = rounded.power + seen**2
-    return white.played_by(white.player.adding(rounded.added), power)
+    seen = evidence.noise.seen_rad
+    white = evidence.noise.std_rad**2  # at the least, where no noise beside it is seen
+    power = np.maximum(rounded.power, white) if math.isnan(seen) else rounded.power + seen**2
+    return evidence.played_by(evidence.player.adding(rounded.added), power)
 
 
 def _squares(fitter: CellFitter, fit: CellFit) -> np.ndarray:
