@@ -66,6 +66,12 @@ def test_noise_without_rounding_is_seen_from_what_repeats(coarse):
     assert 0.0 < noise.seen_rad < 0.8 * noise.std_rad and noise.rounds
 
 
+def test_the_first_counts_of_a_run_from_rest_are_no_speed(coarse):
+    evidence = Evidence(coarse.recorded.as_records(), NOMINAL)
+    runs = range(len(evidence.records.records))
+    assert [evidence.player.drive(run).start for run in runs] == [(0.0, 0.0) for _ in runs]
+
+
 def test_the_highest_lines_of_rounded_positions_show_no_noise_without_rounding(coarse):
     (first, *_) = coarse.recorded.as_records().records
     alone = RecordSet("one", coarse.recorded.sample_rate_hz, (_undescribed(first),))
