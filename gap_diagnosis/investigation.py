@@ -14,6 +14,7 @@ from fjr_records.driven import wrong_sign
 from fjr_records.periodic import RecordedExperiment, RecordedRealization
 from fjr_records.records import Record, RecordSet
 
+from .coarse_encoder import with_coarse_encoder
 from .gates.bag_deviations import GROUPS
 from .gates.bags_gate import as_bags, drift_of_runs, run_changes, scattering
 from .how_far.ledger import Ledger
@@ -28,7 +29,7 @@ from .model.rig_model import Model
 from .model.steady_runs import SteadyRuns
 from .notes import at_limits
 from .outcome.diagnosis import Bags, Diagnosis
-from .outcome.verdict_words import OUT_OF_TIME
+from .outcome.verdict_words import OUT_OF_TIME, ROUNDING
 from .tested_causes import Tested
 from .torque_timing import Timing, timed
 from .which.catalogue import catalogue
@@ -37,6 +38,7 @@ from .which.equivalents import founded, partners
 from .which.estimates import moved_by_scatter, relative_scatter
 from .which.found import Found
 from .which.gains import gain, stands_for
+from .which.rounding import beside_rounding
 from .which.search_space import TOLERANCE
 from .which.stepwise import Stepwise
 from .which.unseen_friction import SCATTER
@@ -166,6 +168,8 @@ def investigate_runs(
         records, cut = within(records)
         progress("windows and noise")
         timing = timed(records, nominal, tolerance, progress)
+        fitter, begun_with = beside_rounding(timing.fitter, Found([timing.refit]), progress)
+        timing = replace(timing, fitter=fitter, refit=begun_with.best)
     else:
         cut = []
         progress("torque of the slow motion")
@@ -178,11 +182,14 @@ def investigate_runs(
         timing = other
         progress(f"search with a torque that is {'' if timing.held else 'not '}held")
         found = _searched(timing, names, progress, until)
-    fitter, evidence, heard = timing.fitter, timing.fitter.evidence, [*timing.notes]
+    fitter = timing.fitter
+    if found.best.effects:
+        fitter, found = beside_rounding(fitter, found, progress)
+    evidence, heard = fitter.evidence, [*timing.notes]
     progress("scatter from run to run")
     bags, scatter, said = _run_scatter(fitter, found.best)
     heard += said
-    found, tested = kept(fitter, found, scatter, progress)
+    found, tested = kept(fitter, found, scatter, progress, names)
     if (tested or not names) and _misses(fitter, found.best) >= 1.0:
         found, tested = replace(found, steps=found.steps[:1]), []
         heard.append(LOST)
@@ -192,6 +199,8 @@ def investigate_runs(
     progress("judgement")
     notes = [*records.notes, *cut, *heard, *_notes(evidence, found)]
     diagnosis = judge(fitter, model, found, tested, alternatives, bags, scatter, notes)
+    if order.effects is None or ROUNDING in order.effects:
+        fitter, found, diagnosis = with_coarse_encoder(fitter, model, found, diagnosis)
     rivals = tuple(fit for fits in tied.values() for fit in fits)
     return Investigation(records, model, diagnosis, Fitted(fitter, found, tuple(tested), rivals))
 

@@ -2,11 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from .outcome.verdict_words import ROUNDING
 from .which.search_space import Space
+
+
+def rounding(
+    step: float, left: float, made: float, misfits: tuple[float, float], beside: Sequence[str] = ()
+) -> str:
+    """Return how a coarse encoder was judged: by the size of its errors, not sample by sample.
+
+    Args:
+        step: of the encoder, rad.
+        left: rms error that all but the rounding leaves, over the rms of y.
+        made: by how much rounding changes the simulation, over the rms of y.
+        misfits: of what leaves it per degree of freedom, by noise alone and by noise and rounding.
+        beside: effects that are named beside it.
+    """
+    rest = f"the refit with {' and '.join(beside)}" if beside else "the refit"
+    return (
+        f"{ROUNDING} is judged by its statistics: every recorded position is a multiple of "
+        f"{step:.4g} rad. Rounding to that step changes the simulated position by {made:.2%} of "
+        f"its rms, {rest} leaves {left:.2%}: {misfits[0]:.3g} times what noise explains, "
+        f"{misfits[1]:.3g} times what noise and rounding explain."
+    )
 
 
 def at_limits(space: Space, x: np.ndarray, plant: Mapping[str, float]) -> list[str]:

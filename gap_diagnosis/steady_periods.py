@@ -70,7 +70,7 @@ def _swinging(view: SteadyView, nominal: Model, order: Order) -> Investigation:
     """
     whole = investigate_runs(view.recorded.as_records(), order)
     if whole.diagnosis.causes and whole.fitted is not None:
-        error = discretisation_error(view.recorded, whole.fitted.found.best.model)
+        error = discretisation_error(view.recorded, whole.fitted.found.best.model.smooth)
         if np.max(error) <= DISCRETISATION_LIMIT:
             return whole
     return _stopped(view, nominal)
@@ -103,7 +103,7 @@ def _viewed(found: Investigation, view: SteadyView) -> Investigation:
     models = {
         "nominal": found.nominal,
         "refit": fitted.found.steps[0].model,
-        "explained": fitted.found.best.model,
+        "explained": fitted.found.best.model.smooth,
     }
     view = replace(view, gates=gates, held=_held(fitted, recorded), models=models)
     figures = bla_gap(recorded, view.held, view.signals, closes=bool(told.causes))

@@ -8,6 +8,7 @@ record: some parts are for fitting, others for selecting, others for reporting.
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Mapping, Sequence
 from functools import cached_property
@@ -138,6 +139,17 @@ class Evidence:
         """What plays the runs; that of slow ones plays nothing."""
         assert isinstance(self.simulator, RecordSimulator)
         return self.simulator
+
+    def played_by(self, simulator: RecordSimulator, noise_power: np.ndarray) -> Evidence:
+        """Return the same records beside other simulations, with other noise.
+
+        Args:
+            simulator: plays the runs.
+            noise_power: variance of an error in each cell, (cells,), rad2.
+        """
+        other = copy.copy(self)
+        other.simulator, other.noise_power = simulator, noise_power
+        return other
 
     def parts_for(self, *purposes: Purpose) -> tuple[int, ...]:
         """Return the indices of the parts for some purposes."""

@@ -6,6 +6,7 @@ drives the model, and an observer holds its motion to the recorded position (`pr
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -31,6 +32,7 @@ _SETTLED = (1e-6, 1e-4)
 """Least and greatest part of the rms position that is left of a transient; between them the noise
 of a line, for a tail that lies in one line must not count there."""
 _SLOWER = 1.5  # times as long as it took the model that is simulated first
+_REST_POWERS = 2, 3, 4  # of time, by which a motion from rest begins
 _ONLY_NOISE = 1.1  # standard deviations that a fit to the first samples leaves by chance
 
 
@@ -65,7 +67,11 @@ class Drive:
         return self.command is not None
 
     def simulated(
-        self, sample_rate_hz: float, p: tuple[float, ...], e: np.ndarray | None
+        self,
+        sample_rate_hz: float,
+        p: tuple[float, ...],
+        e: np.ndarray | None,
+        noise: np.ndarray | None = None,
     ) -> Trajectory:
         """Return the simulated run of a rig.
 
@@ -73,12 +79,13 @@ class Drive:
             sample_rate_hz: rate of the samples.
             p: from `plant.coefficients`.
             e: from `effects.coefficients`, or None.
+            noise: of the encoder, (samples,) in rad; None for none.
 
         Raises:
             InputError: the motion diverged.
         """
         return simulate_law(
-            self.reference, sample_rate_hz, p, self.law, None, e, self.elapsed_s,
+            self.reference, sample_rate_hz, p, self.law, noise, e, self.elapsed_s,
             command=self.command, added=self.added, start=self.start, controller_state=self.entry,
             begin=self.begin,
         )  # fmt: skip
@@ -118,6 +125,8 @@ class RecordSimulator:
         """
         self.records = records
         self._rate = records.sample_rate_hz
+        self._added: Sequence[np.ndarray] | None = None
+        self._named = False
         self.loop: RecordLoop = without_swinging(loop_of(records), records)
         self._starts = [_start(r, noise) for r in records.records]
         self._speeds = [float(np.std(np.diff(r.position)) * self._rate) for r in records.records]
@@ -131,6 +140,32 @@ class RecordSimulator:
         self.loop = without_erratic(self.loop, names, self._growth(Model.nominal(nominal)))
         if isinstance(records, SteadyRuns):
             self._begins = self._near_steady(Model.nominal(nominal), records.run_in, noise)
+
+    def adding(self, signals: Sequence[np.ndarray] | None) -> RecordSimulator:
+        """Return a simulator that adds signals to y, u and q of models whose encoder is smooth.
+
+        Args:
+            signals: what rounding adds on the average to each run, float64 (3, samples); None for
+                nothing.
+        """
+        other = copy.copy(self)
+        other._added, other._named = signals, False
+        return other
+
+    def naming(self) -> RecordSimulator:
+        """Return a simulator that adds the same to models whose encoder rounds, and to no others.
+
+        It plays these with a smooth encoder: no rounding that is simulated is that of the record,
+        sample by sample.
+        """
+        other = copy.copy(self)
+        other._named = True
+        return other
+
+    @property
+    def adds(self) -> bool:
+        """Whether it adds what rounding does."""
+        return self._added is not None
 
     def _entry(self, index: int) -> np.ndarray | None:
         """Return the state in which the law of a run enters it; None for zero."""
@@ -177,7 +212,7 @@ class RecordSimulator:
         if self.too_stiff(model, index):
             return None
         try:
-            first = drive.simulated(self._rate, *_coefficients(model))
+            first = drive.simulated(self._rate, *self._coefficients(model))
             off = np.abs(first.position[:period] - first.position[run_in:])
             rms = float(np.std(first.position[run_in:]))
             limit = min(max(noise_rad / period**0.5, _SETTLED[0] * rms), _SETTLED[1] * rms)
@@ -185,7 +220,7 @@ class RecordSimulator:
             begin = run_in - settled
             if begin <= 0:
                 return None
-            until = drive.part(slice(begin)).simulated(self._rate, *_coefficients(model))
+            until = drive.part(slice(begin)).simulated(self._rate, *self._coefficients(model))
         except InputError:
             return None
         now = drive.elapsed_s + begin / self._rate
@@ -225,7 +260,7 @@ class RecordSimulator:
         model, index = job
         record = self.records.records[index]
         try:
-            run = self._observed(index).simulated(self._rate, *_coefficients(model))
+            run = self._observed(index).simulated(self._rate, *self._coefficients(model))
             return run.torque - record.torque
         except InputError:
             return np.full(record.samples, np.nan)
@@ -247,6 +282,24 @@ class RecordSimulator:
             record.position, self._observer, record.torque, start, elapsed_s=record.elapsed_s
         )
 
+    def disturbed(self, model: Model, index: int, noise: np.ndarray) -> np.ndarray:
+        """Return y, u and q of a model in one run, to which nothing is added, with encoder noise.
+
+        Args:
+            model: the model.
+            index: of the run.
+            noise: (samples,), rad.
+
+        Returns:
+            float64 (3, samples); NaN where the motion diverges.
+        """
+        try:
+            drive = self.drive(index)
+            run = drive.simulated(self._rate, *self._coefficients(model), noise)
+        except InputError:
+            return np.full((3, self.records.records[index].samples), np.nan)
+        return np.array([run.position, run.torque, run.motor if model.rigid else run.link])
+
     def _one(self, job: tuple[Model, int]) -> np.ndarray:
         model, index = job
         if self.too_stiff(model, index):
@@ -256,16 +309,22 @@ class RecordSimulator:
         if state is not None:
             drive = drive.part(slice(first, None), state)
         try:
-            run = drive.simulated(self._rate, *_coefficients(model))
+            run = drive.simulated(self._rate, *self._coefficients(model))
         except InputError:
             return np.full((3, samples), np.nan)
-        signals = np.array([run.position, run.torque, run.motor if model.rigid else run.link])
-        if first == 0:
-            return signals
-        record = self.records.records[index]
-        before = record.position if record.link is None else record.link
-        head = np.array([record.position, record.torque, before])[:, :first]
-        return np.concatenate([head, signals], axis=1)
+        out = np.array([run.position, run.torque, run.motor if model.rigid else run.link])
+        if first:
+            record = self.records.records[index]
+            link = record.position if record.link is None else record.link
+            before = np.array([record.position, record.torque, link])[:, :first]
+            out = np.concatenate([before, out], axis=1)
+        if self._added is None or model.rounds != self._named:
+            return out
+        return out + self._added[index]
+
+    def _coefficients(self, model: Model) -> tuple[tuple[float, ...], np.ndarray | None]:
+        played = model.smooth if self._named else model
+        return played.plant_coefficients, played.effect_coefficients
 
     def too_stiff(self, model: Model, index: int) -> bool:
         """Tell whether a model would take so long to play as no record can call for."""
@@ -273,15 +332,12 @@ class RecordSimulator:
         return too_stiff(model, samples, self._rate, self._speeds[index], self._torques[index])
 
 
-def _coefficients(model: Model) -> tuple[tuple[float, ...], np.ndarray | None]:
-    return model.plant_coefficients, model.effect_coefficients
-
-
 def _start(record: Record, noise: RecordNoise) -> tuple[float, float]:
     """Return position (rad) and velocity (rad/s) at the first sample; zero where noise explains.
 
     The polynomial of lowest degree that leaves no more than noise tells a run that begins to move
-    from rest, whose speed grows from zero, from one that moves already.
+    from rest, whose speed grows from zero, from one that moves already. What an encoder of coarse
+    steps rounds away is no chance: there a motion that may begin from rest at zero does.
     """
     first = record.position[:_FIRST_SAMPLES]
     std = noise.std_rad if noise.known else 0.0
@@ -290,6 +346,8 @@ def _start(record: Record, noise: RecordNoise) -> tuple[float, float]:
     if np.ptp(first) <= 2.0 * _AT_REST * std:
         return float(first.mean()), 0.0
     time = np.arange(first.size) / record.description.sample_rate_hz
+    if noise.rounds and abs(first[0]) < std and _may_begin_from_rest(first, std):
+        return 0.0, 0.0
     for degree in range(1, _HIGHEST_DEGREE + 1):
         powers = np.vander(time / time[-1], degree + 1, increasing=True)
         found = np.linalg.lstsq(powers, first, rcond=None)[0]
@@ -301,3 +359,11 @@ def _start(record: Record, noise: RecordNoise) -> tuple[float, float]:
     if np.all(np.abs(found[:2]) <= _AT_REST * error[:2]):
         return 0.0, 0.0
     return float(found[0]), float(found[1] / time[-1])
+
+
+def _may_begin_from_rest(first: np.ndarray, std: float) -> bool:
+    """Tell whether a motion from rest at zero leaves no more than noise of its first samples."""
+    time = np.linspace(0.0, 1.0, first.size)
+    powers = np.stack([time**power for power in _REST_POWERS], axis=1)
+    left = first - powers @ np.linalg.lstsq(powers, first, rcond=None)[0]
+    return float(np.sqrt(left @ left / (first.size - len(_REST_POWERS)))) <= _ONLY_NOISE * std

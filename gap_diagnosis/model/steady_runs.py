@@ -39,7 +39,7 @@ def steady_runs(recorded: RecordedExperiment) -> SteadyRuns:
     """Return the realizations of an experiment as runs that end with the mean of their periods."""
     whole = recorded.as_records()
     noise, description = record_noise(whole), recorded.experiment
-    mean = replace(noise, std_rad=noise.std_rad / math.sqrt(description.periods))
+    mean = _of_mean(noise, description.periods)
     chosen = compared(recorded)
     records = tuple(_ending_steady(recorded.realizations[i], whole.records[i]) for i in chosen)
     notes = list(recorded.notes)
@@ -51,6 +51,14 @@ def steady_runs(recorded: RecordedExperiment) -> SteadyRuns:
         )
     run_in = max(description.transient_periods, 1) * description.samples_per_period
     return SteadyRuns(recorded.source, recorded.sample_rate_hz, records, tuple(notes), run_in, mean)
+
+
+def _of_mean(noise: RecordNoise, periods: int) -> RecordNoise:
+    """Return the noise of the mean of some periods; what is rounded away may repeat with them."""
+    seen = noise.seen_rad / math.sqrt(periods)
+    if noise.rounds:
+        return replace(noise, seen_rad=seen)
+    return replace(noise, std_rad=noise.std_rad / math.sqrt(periods), seen_rad=seen)
 
 
 def compared(recorded: RecordedExperiment) -> list[int]:

@@ -24,6 +24,7 @@ from .cell_weights import CellWeights
 from .from_parts import from_part
 from .least_squares import Solution, solve
 from .ripples import Ripples
+from .ripples_passed import fewest_cycles
 from .scales import Scales
 from .screening import LARGEST, LARGEST_OF_TORQUES, Proposal, Screening
 from .search_space import Space, space_for, starts
@@ -38,6 +39,7 @@ RIPPLES_TRIED = 3
 NOTHING_LEFT = 2.0
 """Mean squared error over noise below which noise explains what is left."""
 _RIVAL = 0.05  # an error: a second start that costs so much more than the first is not pursued
+_ENOUGH = 24  # numbers of a band, of which chance seldom doubles the mean square
 _ACTS = (
     0.1  # of what is left in a band of a part: an effect that moves it by less does not act there
 )
@@ -118,6 +120,17 @@ class CellFitter:
             seen = self._ripples(parent)[1].load(effect)
         seeds = [*starts(effect, self.scales, cycles, self.nominal), *seen]
         return self.screening_of(parent, seeds)
+
+    def two_harmonics(self, parent: CellFit, effect: str) -> list[dict[str, float]]:
+        """Return starts of a ripple with a second harmonic beside a fit, the best first.
+
+        Only of those numbers of cycles at which the motion passes enough to see one.
+        """
+        tried = self.scales.cycles()
+        tried = tried[tried >= fewest_cycles(self.scales)]
+        if not tried.size:
+            return []
+        return self._ripples(parent)[0].harmonics(effect, tried, RIPPLES_TRIED)
 
     def screening_of(self, parent: CellFit, seeds: Sequence[Mapping[str, float]]) -> Screening:
         """Return what starts promise beside a fit."""
@@ -240,6 +253,23 @@ class CellFitter:
         relative = fit.left / self.weights.select_floor - 1.0
         return float(np.sum(self.weights.counts * relative) / self.weights.counts.sum())
 
+    def left_in_a_band(self, fit: CellFit) -> float:
+        """Return the misfit in the band of the level in which a fit leaves most; NaN as above.
+
+        A cause that acts in a narrow band hardly shows in the mean over all.
+        """
+        if not self.evidence.noise.known:
+            return math.nan
+        weights, worst = self.weights, 0.0
+        relative = weights.counts * (fit.left / weights.select_floor - 1.0)
+        for level in np.unique(weights.select_levels):
+            own = weights.select_levels == level
+            numbers = weights.counts[own].sum(axis=0)
+            enough = numbers >= _ENOUGH
+            if enough.any():
+                worst = max(worst, float((relative[own].sum(axis=0) / numbers)[enough].max()))
+        return worst
+
     def gains(self, after: CellFit, before: CellFit) -> np.ndarray:
         """Return the log-likelihood that one fit gains over another on each part that selects.
 
@@ -252,7 +282,8 @@ class CellFitter:
         """
         return self.weights.gained(after.left, before.left).sum(axis=1)
 
-    def _left(self, model: Model, variance: np.ndarray) -> np.ndarray:
+    def left_by(self, model: Model, variance: np.ndarray) -> np.ndarray:
+        """Return `CellFit.left` of a model, with weights by such variances of the cells, rad2."""
         others = deviated(model) if self.weights.unseen else []
         errors = self.evidence.errors([model, *others], self.select_parts)
         weight = self.weights.select_weight(variance)
@@ -306,4 +337,4 @@ class CellFitter:
         left = errors * self.weights.weight(variance)
         ended = replace(solution, residuals=left, jacobian=known, cost=float(left @ left))
         model = space.model(x)
-        return CellFit(effects, space, model, ended, variance, self._left(model, variance))
+        return CellFit(effects, space, model, ended, variance, self.left_by(model, variance))

@@ -26,6 +26,7 @@ class CellWeights:
         runs: (errors,), the record of each error of the fit.
         counts: (parts, bands), lines of each part that selects.
         select_floor: (parts, bands), least variance of an error there, rad2.
+        select_levels: (parts,), index of the level of each.
         unseen: bool (errors that select,) of each run that no fit sees.
     """
 
@@ -55,10 +56,10 @@ class CellWeights:
         )
         shape = len(self.select_parts), evidence.bands
         self.counts = np.bincount(self._select_bins, minlength=shape[0] * shape[1]).reshape(shape)
-        self._select_levels = np.array(
+        self.select_levels = np.array(
             [of_level(evidence.parts[p].level) for p in self.select_parts]
         )
-        self.select_floor = self._floor.reshape(-1, evidence.bands)[self._select_levels]
+        self.select_floor = self._floor.reshape(-1, evidence.bands)[self.select_levels]
         unseen = np.setdiff1d(of_part[parts], self.runs)
         self.unseen = [of_part[parts] == run for run in unseen]
 
@@ -109,7 +110,7 @@ class CellWeights:
         """
         known = self._noise[: self._evidence.bands]
         noise = np.minimum(known / np.minimum(before, after), 1.0)
-        coherent = np.minimum(self._coherent[self._select_levels], self.counts)
+        coherent = np.minimum(self._coherent[self.select_levels], self.counts)
         numbers = independent(noise, self.counts, coherent)
         return 0.5 * numbers * np.log(before / after)
 

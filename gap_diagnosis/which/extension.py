@@ -81,7 +81,7 @@ class Extension:
         fits = self.ranked(fits, parent)
         first = [fit.effects[-1] for fit in fits[:_POLISHED]]
         near = len(partners(first[:1], set(first))) > 1
-        leading = [self._enriched(self._settled(f, parent, near)) for f in fits[:_POLISHED]]
+        leading = [self._enriched(self._settled(f, parent, near), parent) for f in fits[:_POLISHED]]
         return self.ranked([*leading, *fits[_POLISHED:]], parent)
 
     def tied(self, chosen: CellFit, fits: Sequence[CellFit], parent: CellFit) -> list[str]:
@@ -147,7 +147,7 @@ class Extension:
         self._progress(f"{' + '.join(fit.effects)}, further")
         return self._fitter.further(fit)
 
-    def _enriched(self, fit: CellFit) -> CellFit:
+    def _enriched(self, fit: CellFit, parent: CellFit) -> CellFit:
         """Return a fit whose last effect is a ripple with its second harmonic, if that repeats.
 
         A ripple of two harmonics that is taken for one leaves what looks like a further cause.
@@ -156,7 +156,7 @@ class Extension:
         if not fx.EFFECTS[effect].ripple or self._fitter.misfit(fit) < _WORTH_A_HARMONIC:
             return fit
         self._progress(f"{' + '.join(fit.effects)}, second harmonic")
-        richer = with_second_harmonic(self._fitter, fit, effect)
+        richer = with_second_harmonic(self._fitter, fit, parent)
         if richer is None or not self.gain(richer, fit).present:
             return fit
         # both by the weights of what they leave themselves

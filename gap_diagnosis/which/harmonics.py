@@ -11,19 +11,33 @@ from .cell_fits import CellFit, CellFitter
 from .ripples_passed import LEAST_PASSED, ripples_passed
 
 
-def with_second_harmonic(fitter: CellFitter, fit: CellFit, ripple: str) -> CellFit | None:
-    """Return a fit with a second harmonic of a ripple; None if none promises any.
+def with_second_harmonic(fitter: CellFitter, fit: CellFit, parent: CellFit) -> CellFit | None:
+    """Return a fit with a second harmonic of its last effect; None if none promises any.
+
+    One ripple fitted to two lies between them, so that both are looked for anew as well.
 
     Args:
         fitter: that made the fit.
-        fit: an explanation.
-        ripple: identifier of an angle-periodic effect of it, of one harmonic so far.
+        fit: an explanation whose last effect is a ripple of one harmonic.
+        parent: the fit that it extends.
     """
-    proposals = fitter.screening_of(fit, _seeds(ripple)).proposals()
-    found = fitter.add(fit, ripple, proposals, 1)
-    if found is None or ripples_passed(found.model, ripple, fitter.scales) < LEAST_PASSED:
-        return None
-    return replace(found, effects=fit.effects)
+    ripple = fit.effects[-1]
+    more = fitter.add(fit, ripple, fitter.screening_of(fit, _seeds(ripple)).proposals(), 1)
+    both = fitter.two_harmonics(parent, ripple)
+    anew = None
+    if both:
+        anew = fitter.add(parent, ripple, fitter.screening_of(parent, both).proposals())
+        anew = None if anew is None else fitter.further(anew)  # it begins far from where it ends
+    found = [
+        replace(one, effects=fit.effects)
+        for one in (more, anew)
+        if one is not None and ripples_passed(one.model, ripple, fitter.scales) >= LEAST_PASSED
+    ]
+    best = found[0] if found else None
+    for one in found[1:]:
+        if best is not None and fitter.gains(one, best).sum() > 0.0:
+            best = one
+    return best
 
 
 def _seeds(effect: str) -> list[Mapping[str, float]]:

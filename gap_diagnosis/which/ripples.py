@@ -8,6 +8,8 @@ sample and then averaged over as many as the lines of the evidence allow.
 
 from __future__ import annotations
 
+import cmath
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -21,6 +23,7 @@ from ..model.rig_model import Model
 from .least_squares import Solution
 
 MOST_TRIED = 240
+_LEAST_FIRST = 0.1  # of the second harmonic: a smaller first one is no ripple of that number
 _FREE_HZ = 1e-3  # below, a free body has no response
 _LEAST_RATE = 8  # samples in a period of the highest line: averaging takes off 3 % there
 
@@ -67,24 +70,48 @@ class Ripples:
             tried: numbers to try, ascending; thinned out to `MOST_TRIED`.
             most: how many to return, each a maximum of its own.
         """
-        if len(tried) > MOST_TRIED:
-            tried = tried[np.unique(np.linspace(0, len(tried) - 1, MOST_TRIED).astype(int))]
-        gains = np.array([self._gain(effect, float(cycles)) for cycles in tried])
-        padded = np.concatenate([[-1.0], gains, [-1.0]])
-        peaks = np.flatnonzero((gains >= padded[:-2]) & (gains > padded[2:]))
-        return [float(tried[i]) for i in peaks[np.argsort(-gains[peaks])][:most]]
+        tried = _thinned(tried)
+        gains = np.array([self._fitted(effect, (float(cycles),))[1] for cycles in tried])
+        return [float(tried[i]) for i in _peaks(gains)[:most]]
 
-    def _gain(self, effect: str, cycles: float) -> float:
-        """Return the fall of the cost by sine and cosine of a ripple of the best size."""
-        moved = [self._moved(k, self._torques(effect, k, cycles)) for k in range(len(self._runs))]
+    def harmonics(self, effect: str, tried: np.ndarray, most: int) -> list[dict[str, float]]:
+        """Return the ripples with a second harmonic that promise most, best first.
+
+        Args:
+            effect: identifier of an effect that is periodic in the motor angle.
+            tried: numbers to try, ascending; thinned out to `MOST_TRIED`.
+            most: how many to return, each a maximum of its own.
+
+        Returns:
+            values by the names of the effect's parameters.
+        """
+        tried = _thinned(tried)
+        fits = [self._fitted(effect, (float(c), 2.0 * float(c))) for c in tried]
+        names = fx.EFFECTS[effect].names
+        found = []
+        for i in _peaks(np.array([gain for _, gain in fits]))[:most]:
+            sizes = fits[i][0]
+            first, second = complex(*sizes[:2]), complex(*sizes[2:])
+            phase, size = cmath.phase(first), max(abs(first), _LEAST_FIRST * abs(second))
+            bend = math.remainder(cmath.phase(second) - 2.0 * phase, 2.0 * math.pi)
+            values = (size, float(tried[i]), phase, abs(second) / size, bend)
+            found.append(dict(zip(names, values, strict=True)))
+        return found
+
+    def _fitted(self, effect: str, cycles: Sequence[float]) -> tuple[np.ndarray, float]:
+        """Return sizes of sine and cosine of each number of cycles, and the fall of the cost."""
         own = []
-        for quarter in (0, 1):
-            changes = {i: pair[quarter] for i, pair in zip(self._runs, moved, strict=True)}
-            column = self._evidence.changes(changes, self._parts, self._every)
-            own.append(self._beyond(column * self._weight))
+        for number in cycles:
+            moved = [
+                self._moved(k, self._torques(effect, k, number)) for k in range(len(self._runs))
+            ]
+            for quarter in (0, 1):
+                changes = {i: pair[quarter] for i, pair in zip(self._runs, moved, strict=True)}
+                column = self._evidence.changes(changes, self._parts, self._every)
+                own.append(self._beyond(column * self._weight))
         columns = np.array(own)
         sizes = np.linalg.lstsq(columns.T, -self._left, rcond=1e-6)[0]
-        return -float(sizes @ (columns @ self._left))
+        return sizes, -float(sizes @ (columns @ self._left))
 
     def _torques(self, effect: str, k: int, cycles: float) -> np.ndarray:
         """Return the torques by ripples of size 1 along the motion.
@@ -132,6 +159,19 @@ class Ripples:
     def _beyond(self, errors: np.ndarray) -> np.ndarray:
         """Return what the parent's parameters can't follow of errors, (errors,)."""
         return errors - self._basis @ (self._basis.T @ errors)
+
+
+def _thinned(tried: np.ndarray) -> np.ndarray:
+    if len(tried) <= MOST_TRIED:
+        return tried
+    return tried[np.unique(np.linspace(0, len(tried) - 1, MOST_TRIED).astype(int))]
+
+
+def _peaks(gains: np.ndarray) -> np.ndarray:
+    """Return the indices of the maxima, greatest first."""
+    padded = np.concatenate([[-1.0], gains, [-1.0]])
+    peaks = np.flatnonzero((gains >= padded[:-2]) & (gains > padded[2:]))
+    return np.asarray(peaks[np.argsort(-gains[peaks])])
 
 
 def _averaged(hop: int, lines: int) -> int:

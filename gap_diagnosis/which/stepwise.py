@@ -60,7 +60,7 @@ class Stepwise:
         """Search forward from the fit of the base parameters alone."""
         found = Found([refit])
         while len(found.best.effects) < MOST_CAUSES:
-            if self._fitter.misfit(found.best) < NOTHING_LEFT:
+            if self._fitter.left_in_a_band(found.best) < NOTHING_LEFT:
                 break
             if self._over:
                 found.complete = False
