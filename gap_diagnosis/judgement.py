@@ -10,6 +10,7 @@ from .how_far.ledger import Ledger
 from .model.evidence import Evidence
 from .model.rig_model import Model
 from .model.steady_runs import SteadyRuns
+from .notes import SCALED, beyond_tolerance
 from .outcome.diagnosis import (
     Bags,
     Candidate,
@@ -24,7 +25,7 @@ from .outcome.diagnosis import (
     Verdict,
 )
 from .tested_causes import Tested
-from .which.cell_fits import NOTHING_LEFT, CellFitter
+from .which.cell_fits import NOTHING_LEFT, CellFit, CellFitter
 from .which.found import Found
 from .which.gains import gain
 from .which.presence import (
@@ -128,8 +129,16 @@ def judge(
         bags=bags,
         ranking=_ranking(fitter, found),
         parameters=estimates,
-        notes=[*([THIN] if thin else []), *notes],
+        notes=[*([THIN] if thin else []), *_on_parameters(verdict, best, fitter), *notes],
     )
+
+
+def _on_parameters(verdict: Verdict, best: CellFit, fitter: CellFitter) -> list[str]:
+    """Return what must be said of base parameters that stand in updated.yaml."""
+    said = [SCALED] if verdict == "parameters_only" else []
+    if verdict not in ("effect", "ambiguous", "parameters_only"):
+        return said
+    return [*said, *beyond_tolerance(best.model.plant, fitter.nominal, fitter.tolerance)]
 
 
 def _cause(

@@ -9,6 +9,8 @@ import numpy as np
 from .outcome.verdict_words import ROUNDING
 from .which.search_space import Space
 
+SCALED = "A torque-constant error is equivalent to scaling all parameters."
+
 
 def rounding(
     step: float, left: float, made: float, misfits: tuple[float, float], beside: Sequence[str] = ()
@@ -29,6 +31,25 @@ def rounding(
         f"its rms, {rest} leaves {left:.2%}: {misfits[0]:.3g} times what noise explains, "
         f"{misfits[1]:.3g} times what noise and rounding explain."
     )
+
+
+def beyond_tolerance(
+    plant: Mapping[str, float], nominal: Mapping[str, float], tolerance: float
+) -> list[str]:
+    """Return a note on base parameters that moved beyond the tolerance, if most of them did.
+
+    Args:
+        plant: the fitted base parameters.
+        nominal: their datasheet values.
+        tolerance: how far one may be off, relative.
+    """
+    far = [n for n, v in plant.items() if abs(v - nominal[n]) > tolerance * abs(nominal[n])]
+    if len(far) <= len(plant) // 2:
+        return []
+    return [
+        f"{', '.join(far)} lie beyond the tolerance of the nominal file: look for a gain, "
+        "of the torque or of the encoder (an eccentric one has one about its zero)."
+    ]
 
 
 def at_limits(space: Space, x: np.ndarray, plant: Mapping[str, float]) -> list[str]:

@@ -33,6 +33,11 @@ UNSTEADY = (
     "beside a remainder, which a change within a run is a part of."
 )
 
+ALONE = (
+    "Each level has a single run, so no run is held out of the fits: they are compared block by "
+    "block, some of which no fit has seen."
+)
+
 
 def investigate_periods(recorded: RecordedExperiment, order: Order) -> Investigation:
     """Diagnose an experiment of steady periods; what a gate forbids is not fitted.
@@ -116,10 +121,20 @@ def _viewed(found: Investigation, view: SteadyView) -> Investigation:
             "gap_figures": seen,
             "where": beyond or view.maps["nominal"].places(),
             "next_experiment": _next(fitted, view, told),
-            "notes": [*([gate.sentence] if not gate.passed else []), *gates.notes, *told.notes],
+            "notes": [
+                *([gate.sentence] if not gate.passed else []),
+                *([ALONE] if told.reported_on == "blocks" and _alone(recorded) else []),
+                *gates.notes,
+                *told.notes,
+            ],
         }
     )
     return replace(found, recorded=recorded, diagnosis=told, steady=view)
+
+
+def _alone(recorded: RecordedExperiment) -> bool:
+    """Tell whether each level has a single run."""
+    return len(recorded.realizations) == len(recorded.levels)
 
 
 def _held(fitted: Fitted, recorded: RecordedExperiment) -> tuple[int, ...]:

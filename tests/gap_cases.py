@@ -16,6 +16,8 @@ from fjr_records.periodic import RecordedExperiment, RecordedRealization
 from fjr_sim_node.plant import PLANT
 from fjr_sim_node.simulation.simulator import SIMULATOR, run_realization
 from gap_diagnosis.any_record import investigate
+from gap_diagnosis.gates.bag_changes import BagChanges
+from gap_diagnosis.gates.bags_gate import run_changes
 from gap_diagnosis.investigation import Fitted
 from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.model.rig_model import Model
@@ -185,3 +187,10 @@ def found_in(
     found = investigate(recorded, nominal, effects=effects or None, tolerance=tolerance)
     assert found.fitted is not None
     return found.diagnosis, found.fitted
+
+
+def changes_of(recorded: RecordedExperiment, model: Model) -> tuple[BagChanges | None, Evidence]:
+    """Return what changes from bag to bag beside a model that leaves noise alone."""
+    evidence = Evidence(steady_runs(recorded), model.whole_plant)
+    variance = evidence.floor(range(len(evidence.parts)))
+    return run_changes(evidence, variance, model), evidence

@@ -64,12 +64,17 @@ def run_changes(evidence: Evidence, variance: np.ndarray, model: Model) -> BagCh
         variance: (cells,), of an error in each cell, rad2.
         model: the best model.
     """
-    runs = evidence.records.records
-    times = np.arange(len(runs), dtype=float)
-    if isinstance(evidence.records, SteadyRuns):
-        times = np.array([r.elapsed_s for r in runs])
+    levels = np.array([r.level for r in evidence.records.records])
     errors, blocks = run_errors(evidence, variance)
-    return bag_changes(errors, np.array([r.level for r in runs]), times, model, blocks)
+    return bag_changes(errors, levels, _times(evidence), model, blocks)
+
+
+def _times(evidence: Evidence) -> np.ndarray:
+    """Return when runs began, (runs,): s, or their order where nothing tells."""
+    runs = evidence.records.records
+    if isinstance(evidence.records, SteadyRuns):
+        return np.array([r.elapsed_s for r in runs])
+    return np.arange(len(runs), dtype=float)
 
 
 def worst_trend(bags: Bags) -> tuple[str, BagTrend]:
@@ -98,10 +103,7 @@ def _along(trend: BagTrend) -> str:
 
 def as_bags(changes: BagChanges, evidence: Evidence) -> Bags:
     """Return changes as the outcome holds them, trends from the first run to the last."""
-    runs = evidence.records.records
-    span = len(runs) - 1.0
-    if isinstance(evidence.records, SteadyRuns):
-        span = float(np.ptp([r.elapsed_s for r in runs]))
+    span = float(np.ptp(_times(evidence)))
     return Bags(
         trends={
             t.group: BagTrend(change_percent=100.0 * t.slope_per_s * span, p_value=t.p_value)

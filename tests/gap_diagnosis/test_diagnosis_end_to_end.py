@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 from fjr_cli.app import app
 from fjr_records.periodic import read_experiment
 from fjr_sim_node.plant import PLANT
-from gap_diagnosis.investigation import investigate
+from gap_diagnosis.any_record import investigate
 from gap_diagnosis.outcome.diagnosis import Diagnosis
 
 pytestmark = pytest.mark.slow
