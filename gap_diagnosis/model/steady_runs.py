@@ -29,10 +29,12 @@ class SteadyRuns(RecordSet):
     Attributes:
         run_in: samples before the steady period, which are not compared.
         noise: of the positions in it.
+        top_hz: highest frequency that is excited or looked at; beyond it windows show leakage.
     """
 
     run_in: int = 0
     noise: RecordNoise | None = None
+    top_hz: float = math.inf
 
 
 def steady_runs(recorded: RecordedExperiment) -> SteadyRuns:
@@ -50,7 +52,10 @@ def steady_runs(recorded: RecordedExperiment) -> SteadyRuns:
             "select and to report."
         )
     run_in = max(description.transient_periods, 1) * description.samples_per_period
-    return SteadyRuns(recorded.source, recorded.sample_rate_hz, records, tuple(notes), run_in, mean)
+    top_hz = recorded.lines * description.base_frequency_hz
+    return SteadyRuns(
+        recorded.source, recorded.sample_rate_hz, records, tuple(notes), run_in, mean, top_hz
+    )
 
 
 def _of_mean(noise: RecordNoise, periods: int) -> RecordNoise:

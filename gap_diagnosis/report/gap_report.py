@@ -23,6 +23,12 @@ from .outcome_values import origin, outcome_plots, outcome_values
 from .run_plots import run_level_plots, tried_plot
 
 Plots = dict[str, Any]
+_ABSENT: Mapping[str, Any] = {
+    "fitted": False, "noise_known": False, "tried": [], "parameters": [], "method": "",
+    "windows_s": "", "steady": False, "gates": [], "maps": False, "stages": 0, "repeatable": True,
+    "places": [], "distances": None,
+}  # fmt: skip
+"""What the template shows of runs that were not fitted, and of records."""
 
 
 def compared(investigation: Investigation) -> list[RunComparison]:
@@ -48,7 +54,7 @@ def render_gap_report(
     steady, fitted = investigation.steady, investigation.fitted
     overview, levels = outcome_plots(diagnosis), [f"Level {one.level}, {one.name}" for one in found]
     by_level: list[Plots] = [{} for _ in found]
-    values: dict[str, Any] = {}
+    values = dict(_ABSENT)
     if fitted is not None:
         known = fitted.evidence.noise.known
         by_level = [run_level_plots(one, known) for one in found]

@@ -9,14 +9,13 @@ from fjr_sim_node import effects as fx
 from .cell_fits import CellFit, CellFitter
 from .equivalents import ONE_CAUSE, founded, holders, partners, plainness
 from .gains import Gain, gain, left_of, stands_for
-from .harmonics import with_second_harmonic
+from .harmonics import WORTH_A_HARMONIC, with_second_harmonic
 from .screening import Proposal, Screening
 
 _PROPOSED, _FITTED, _STARTS = (7, 5), (5, 3), (2, 1)
 """Effects that are tried at several sizes, those of them that are fitted, and from how many starts:
 beside no cause yet, beside others."""
 _POLISHED = 2  # leading fits of a step that are taken further
-_WORTH_A_HARMONIC = 1.3  # a misfit: what noise leaves is no second harmonic
 _AGAIN = 8  # effects that are screened beside a cause, and those that depend on others
 _OUTDATED = 0.1  # of the squared error that is left: then what was screened before is too far
 _MUCH_LESS = 0.3  # of the greatest gain: a cause that gains less waits for the next step
@@ -153,7 +152,7 @@ class Extension:
         A ripple of two harmonics that is taken for one leaves what looks like a further cause.
         """
         effect = fit.effects[-1]
-        if not fx.EFFECTS[effect].ripple or self._fitter.misfit(fit) < _WORTH_A_HARMONIC:
+        if not fx.EFFECTS[effect].ripple or self._fitter.misfit(fit) < WORTH_A_HARMONIC:
             return fit
         self._progress(f"{' + '.join(fit.effects)}, second harmonic")
         richer = with_second_harmonic(self._fitter, fit, parent)

@@ -10,11 +10,15 @@ import numpy as np
 from .cell_fits import CellFit, CellFitter
 from .ripples_passed import LEAST_PASSED, ripples_passed
 
+WORTH_A_HARMONIC = 1.3
+"""Misfit from which a second harmonic is looked for: what noise leaves is none."""
+
 
 def with_second_harmonic(fitter: CellFitter, fit: CellFit, parent: CellFit) -> CellFit | None:
     """Return a fit with a second harmonic of its last effect; None if none promises any.
 
-    One ripple fitted to two lies between them, so that both are looked for anew as well.
+    One ripple fitted to two may lie between them: where a second one beside it leaves more than
+    noise, both are looked for anew.
 
     Args:
         fitter: that made the fit.
@@ -23,21 +27,24 @@ def with_second_harmonic(fitter: CellFitter, fit: CellFit, parent: CellFit) -> C
     """
     ripple = fit.effects[-1]
     more = fitter.add(fit, ripple, fitter.screening_of(fit, _seeds(ripple)).proposals(), 1)
+    if more is not None and fitter.misfit(more) < WORTH_A_HARMONIC:
+        return _passed(fitter, more, fit)
     both = fitter.two_harmonics(parent, ripple)
     anew = None
     if both:
         anew = fitter.add(parent, ripple, fitter.screening_of(parent, both).proposals())
         anew = None if anew is None else fitter.further(anew)  # it begins far from where it ends
-    found = [
-        replace(one, effects=fit.effects)
-        for one in (more, anew)
-        if one is not None and ripples_passed(one.model, ripple, fitter.scales) >= LEAST_PASSED
-    ]
-    best = found[0] if found else None
-    for one in found[1:]:
-        if best is not None and fitter.gains(one, best).sum() > 0.0:
-            best = one
-    return best
+    found = [one for each in (more, anew) if (one := _passed(fitter, each, fit)) is not None]
+    if len(found) == 2 and fitter.gains(found[1], found[0]).sum() > 0.0:
+        return found[1]
+    return found[0] if found else None
+
+
+def _passed(fitter: CellFitter, found: CellFit | None, fit: CellFit) -> CellFit | None:
+    """Return what was found, its effects in order, if the motion passes enough of its ripples."""
+    if found is None or ripples_passed(found.model, fit.effects[-1], fitter.scales) < LEAST_PASSED:
+        return None
+    return replace(found, effects=fit.effects)
 
 
 def _seeds(effect: str) -> list[Mapping[str, float]]:

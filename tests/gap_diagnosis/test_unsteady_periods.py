@@ -109,10 +109,8 @@ def test_a_transient_is_no_drift():
     found = investigate(recorded, PLANT.defaults(), effects=KNOWN)
     assert found.diagnosis.verdict == "bad_data"
     assert any("still transient" in note for note in found.diagnosis.notes)
-    assert (
-        found.steady.gates.gates[-1].name == "stationary within runs"
-        and found.steady.gates.gates[-1].passed
-    )
+    last = found.steady.gates.gates[-1]
+    assert last.name == "stationary within runs" and last.passed
 
 
 def test_a_drift_of_a_rigid_axis_is_told_from_a_transient():
