@@ -37,7 +37,7 @@ from .which.cell_fits import NOTHING_LEFT, CellFit, CellFitter
 from .which.equivalents import founded, partners
 from .which.estimates import moved_by_scatter, relative_scatter
 from .which.found import Found
-from .which.gains import gain, stands_for
+from .which.gains import stands_for
 from .which.rounding import beside_rounding
 from .which.search_space import TOLERANCE
 from .which.stepwise import Stepwise
@@ -251,19 +251,13 @@ def _tied(fitter: CellFitter, found: Found, tested: Tested, names: Sequence[str]
             other = fitter.add(tested.without, effect, proposals) if proposals else None
         if other is None:
             continue
-        as_well = partial(_does_as_well, fitter, best, tested, effect in near)
+        as_well = partial(
+            stands_for, fitter, best=best, first=tested.gain.mean, near=effect in near
+        )
         further = other
         if as_well(other) or as_well(further := fitter.further(other)):
             tied.append(further)
     return tied
-
-
-def _does_as_well(
-    fitter: CellFitter, best: CellFit, tested: Tested, near: bool, other: CellFit
-) -> bool:
-    """Tell whether unseen parts do not tell a fit with another effect from the best."""
-    behind = gain(fitter, best, other)
-    return stands_for(behind, tested.gain.mean) or (near and not behind.present)
 
 
 def _notes(evidence: Evidence, found: Found) -> list[str]:

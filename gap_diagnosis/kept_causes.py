@@ -110,7 +110,7 @@ def _in_its_place(
     if not fits:
         return None
     most = max(fits, key=lambda fit: gain(fitter, fit, without).mean)
-    return most if stands_for(gain(fitter, best, most), tested.gain.mean) else None
+    return most if stands_for(fitter, most, best, tested.gain.mean) else None
 
 
 def _changing(tested: Tested) -> list[str]:

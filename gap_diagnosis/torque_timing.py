@@ -62,7 +62,7 @@ class Timing:
         (effect,) = late[:1]
         worth = gain(self.fitter, best, self.fitter.without(best, effect)).mean
         held = other.fitter.without(best, effect)
-        return other if stands_for(gain(self.fitter, best, held), worth) else None
+        return other if stands_for(self.fitter, held, best, worth) else None
 
 
 def _half(model: Model, effect: str, rate: float) -> bool:

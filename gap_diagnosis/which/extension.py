@@ -16,6 +16,8 @@ _PROPOSED, _FITTED, _STARTS = (7, 5), (5, 3), (2, 1)
 """Effects that are tried at several sizes, those of them that are fitted, and from how many starts:
 beside no cause yet, beside others."""
 _POLISHED = 2  # leading fits of a step that are taken further
+_FURTHER = 3  # times that a leading fit is taken further, while what it leaves still falls
+_STILL_FALLS = 0.8  # of the squared error on unseen parts
 _AGAIN = 8  # effects that are screened beside a cause, and those that depend on others
 _OUTDATED = 0.1  # of the squared error that is left: then what was screened before is too far
 _MUCH_LESS = 0.3  # of the greatest gain: a cause that gains less waits for the next step
@@ -87,7 +89,7 @@ class Extension:
         """Return the effects that unseen parts cannot tell from the chosen one."""
         first = self.gain(chosen, parent).mean
         others = [f for f in fits if f is not chosen and f.effects[:-1] == chosen.effects[:-1]]
-        return [f.effects[-1] for f in others if stands_for(self.gain(chosen, f), first)]
+        return [f.effects[-1] for f in others if stands_for(self._fitter, f, chosen, first)]
 
     def chosen(self, fits: Sequence[CellFit], parent: CellFit) -> CellFit | None:
         """Return the best fit whose gain repeats, unless another one gains much more.
@@ -105,7 +107,7 @@ class Extension:
             return None
         first = repeating[0]
         worth = self.gain(first, parent).mean
-        alike = [f for f in repeating if f is first or stands_for(self.gain(first, f), worth)]
+        alike = [f for f in repeating if f is first or stands_for(self._fitter, f, first, worth)]
         laws = [fit.effects for fit in alike]
         return min(alike, key=lambda fit: plainness(fit.effects, fit.space.effects, laws))
 
@@ -143,8 +145,13 @@ class Extension:
         closes_little = left_of(self._fitter, fit, parent) > _OUTDATED
         if fit.solution.converged and closes_little and not alike:
             return fit
-        self._progress(f"{' + '.join(fit.effects)}, further")
-        return self._fitter.further(fit)
+        for _ in range(_FURTHER):
+            self._progress(f"{' + '.join(fit.effects)}, further")
+            before, fit = fit, self._fitter.further(fit)
+            falls = left_of(self._fitter, fit, before) < _STILL_FALLS
+            if fit.solution.converged or not falls or self._fitter.misfit(fit) < WORTH_A_HARMONIC:
+                break
+        return fit
 
     def _enriched(self, fit: CellFit, parent: CellFit) -> CellFit:
         """Return a fit whose last effect is a ripple with its second harmonic, if that repeats.

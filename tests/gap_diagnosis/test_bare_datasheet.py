@@ -9,7 +9,7 @@ import pytest
 from test_evidence import NOMINAL, records
 
 from gap_diagnosis.any_record import investigate
-from gap_diagnosis.investigation import LOST, Investigation
+from gap_diagnosis.investigation import LOST, Investigation, Order, investigate_runs
 from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.which.cell_fits import CellFitter
 from gap_diagnosis.which.equivalents import founded
@@ -126,6 +126,6 @@ def test_a_law_whose_shape_comes_to_a_bound_gives_way_to_the_law_that_it_is_ther
 
 def test_where_the_refit_misses_far_more_than_the_motion_nothing_is_searched():
     absurd = {**NOMINAL, "jm": 1e-4, "k0": 5.0, "fsm": 0.0, "fvm": 0.01}
-    tried = investigate(records(), absurd)
+    tried = investigate_runs(records(), Order(absurd))
     assert LOST in tried.diagnosis.notes and tried.diagnosis.verdict == "unexplained"
     assert len(tried.fitted.found.steps) == 1 and tried.fitted.found.rivals == {1: []}
