@@ -59,7 +59,7 @@ class Sight:
             [r.position for r in chosen],
             [r.torque for r in chosen],
             records.sample_rate_hz,
-            self._evidence.lines * self._evidence.line_hz,
+            self._evidence.band_hz,
             nominal.plant,
         )
         fitted = self._evidence.parts_for("fit")

@@ -35,7 +35,6 @@ _SLOW_WINDOWS = 96
 _SLIGHT = 0.01  # of the torque: in a slow motion, less of it says nothing
 _SIMULATION = 1e-3  # error of the simulation itself, of its torque or of its motion
 _DIVERGED = 1e6
-_FEWEST_LINES = 8
 
 
 class Evidence:
@@ -84,9 +83,6 @@ class Evidence:
             known = records.noise if isinstance(records, SteadyRuns) else None
             self.noise = known or record_noise(records)
             self.lines = self._lines_with_signal()
-            if isinstance(records, SteadyRuns):
-                highest = math.ceil(records.top_hz / self.line_hz) + 1
-                self.lines = min(self.lines, max(highest, _FEWEST_LINES))
             top_hz = self.lines * self.line_hz
             self.simulator = RecordSimulator(records, self.noise, top_hz, nominal)
         self.edges = _edges(self.lines)
@@ -118,6 +114,12 @@ class Evidence:
     def line_hz(self) -> float:
         """Width of a line (Hz)."""
         return 0.5 * self.records.sample_rate_hz / self.hop
+
+    @property
+    def band_hz(self) -> float:
+        """Highest frequency that is excited, as far as that is known; lines above hold harmonics."""
+        top_hz = self.lines * self.line_hz
+        return min(top_hz, self.records.top_hz) if isinstance(self.records, SteadyRuns) else top_hz
 
     @property
     def bands(self) -> int:

@@ -29,7 +29,7 @@ class SteadyRuns(RecordSet):
     Attributes:
         run_in: samples before the steady period, which are not compared.
         noise: of the positions in it.
-        top_hz: highest frequency that is excited or looked at; beyond it windows show leakage.
+        top_hz: highest frequency that is excited.
     """
 
     run_in: int = 0
@@ -52,7 +52,7 @@ def steady_runs(recorded: RecordedExperiment) -> SteadyRuns:
             "select and to report."
         )
     run_in = max(description.transient_periods, 1) * description.samples_per_period
-    top_hz = recorded.lines * description.base_frequency_hz
+    top_hz = max(description.excited_harmonics) * description.base_frequency_hz
     return SteadyRuns(
         recorded.source, recorded.sample_rate_hz, records, tuple(notes), run_in, mean, top_hz
     )

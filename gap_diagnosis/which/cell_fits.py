@@ -95,7 +95,7 @@ class CellFitter:
             [r.position for r in records.records],
             [r.torque for r in records.records],
             records.sample_rate_hz,
-            evidence.lines * evidence.line_hz,
+            evidence.band_hz,
             self.nominal,
         )
 

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
+import numpy as np
+
 from fjr_sim_node import effects as fx
 
-from .cell_fits import CellFit, CellFitter
+from .cell_fits import NOTHING_LEFT, CellFit, CellFitter
 from .equivalents import ONE_CAUSE, founded, holders, partners, plainness
 from .gains import Gain, gain, left_of, stands_for
 from .harmonics import WORTH_A_HARMONIC, with_second_harmonic
@@ -20,6 +22,8 @@ _FURTHER = 3  # times that a leading fit is taken further, while what it leaves 
 _STILL_FALLS = 0.8  # of the squared error on unseen parts
 _AGAIN = 8  # effects that are screened beside a cause, and those that depend on others
 _OUTDATED = 0.1  # of the squared error that is left: then what was screened before is too far
+_NEARLY_ALL, _MOST = 0.1, 0.5
+"""Of the squared error: what a fit leaves that closes nearly all, and one that leaves most."""
 _MUCH_LESS = 0.3  # of the greatest gain: a cause that gains less waits for the next step
 _START_LESS = 0.2  # of the greatest gain of a start: an effect whose best one gains less waits
 
@@ -94,10 +98,14 @@ class Extension:
     def chosen(self, fits: Sequence[CellFit], parent: CellFit) -> CellFit | None:
         """Return the best fit whose gain repeats, unless another one gains much more.
 
+        What closes nearly all of the squared error goes before what gains more in many bands but
+        leaves most of it: a constant torque, say, moves the angle over which others ripple.
+
         Of those that unseen parts cannot tell from it, one that holds no other as a limit case, the
         one with the fewest parameters, and then the commoner one.
         """
         gains = [gain(self._fitter, fit, parent, fit.acts) for fit in fits]
+        present = [fit for fit, found in zip(fits, gains, strict=True) if found.present]
         repeating = [
             fit
             for fit, found in zip(fits, gains, strict=True)
@@ -105,6 +113,10 @@ class Extension:
         ]
         if not repeating:
             return None
+        left = [left_of(self._fitter, fit, parent) for fit in present]
+        nearly_all = present[int(np.argmin(left))]
+        if min(left) < _NEARLY_ALL and left_of(self._fitter, repeating[0], parent) > _MOST:
+            return nearly_all
         first = repeating[0]
         worth = self.gain(first, parent).mean
         alike = [f for f in repeating if f is first or stands_for(self._fitter, f, first, worth)]
@@ -170,9 +182,20 @@ class Extension:
         return richer if self.gain(richer, alone).present else alone
 
     def _one_cause(self, parent: CellFit, refit: CellFit) -> list[str]:
-        """Return what could only name a cause of the parent twice; see `ONE_CAUSE`."""
+        """Return what could only name a cause of the parent twice; see `ONE_CAUSE`.
+
+        Not where a band is left in which the parent closes little: there another cause acts.
+        """
         left, gap = self._fitter.misfit(parent) - 1.0, self._fitter.misfit(refit) - 1.0
-        return partners(parent.effects, set(self.effects)) if left < ONE_CAUSE * gap else []
+        if not left < ONE_CAUSE * gap:
+            return []
+        weights = self._fitter.weights
+        over = [fit.left / weights.select_floor - 1.0 for fit in (parent, refit)]
+        bands = [
+            np.sum(weights.counts * each, axis=0) / weights.counts.sum(axis=0) for each in over
+        ]
+        open_bands = (bands[0] > NOTHING_LEFT) & (bands[0] > _MOST * bands[1])
+        return [] if open_bands.any() else partners(parent.effects, set(self.effects))
 
     def screened(self, parent: CellFit, effects: Sequence[str]) -> dict[str, Screening]:
         """Return screenings beside a fit: of all effects the first time, then of those that count.

@@ -98,7 +98,7 @@ def test_steady_periods_of_a_loop_that_swings_without_the_missing_friction_are_n
 
 
 def test_what_cannot_be_simulated_with_its_causes_either_stays_bad_data(monkeypatch):
-    monkeypatch.setattr("gap_diagnosis.any_record.discretisation_error", lambda *_: np.ones(1))
+    monkeypatch.setattr("gap_diagnosis.steady_periods.discretisation_error", lambda *_: np.ones(1))
     smooth = {**PLANT.defaults(), **dict.fromkeys(FRICTION, 0.0)}
     case = simulate_case({}, seed=5, controller={"p": 600.0, "d": 60.0, "n": 24.0}, **SHORT)
     found = investigate(case.recorded, smooth, effects=ADDED).diagnosis

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from gap_cases import SHORT, fitter_of, simulate_case
@@ -116,15 +118,25 @@ def test_an_effect_whose_size_may_be_zero_is_not_sure(names, values, stds, there
 
 
 def test_a_gain_is_known_as_far_as_the_datasheet_is():
-    """The record of a rig whose torque has a gain: its parameters and the gain are one number."""
+    """It scales all other parameters, so data alone say nothing of its size."""
     gain = "torque_gain.relative_error"
-    recorded = simulate_case({gain: 0.3}, seed=3, off=0.0, **SHORT).recorded
-    fitter = fitter_of(recorded)
+    fitter = fitter_of(simulate_case(seed=3, off=0.0, **SHORT).recorded)
     refit = fitter.refit()
-    fit = fitter.add(refit, "torque_gain", fitter.screening(refit, "torque_gain").proposals())
-    found = cell_estimates(fit, fitter, {}, {"torque_gain": refit})[gain]
-    assert found.low < 0.3 < found.high
-    assert 0.05 < found.high - found.low < 0.3
+    own = refit.solution.jacobian
+    for size, there in ((0.3, True), (0.02, False)):
+        solution = replace(
+            refit.solution,
+            x=np.append(refit.solution.x, size),
+            jacobian=np.column_stack([own, -own.sum(axis=1)]),
+        )
+        space = replace(refit.space, effects=(gain,), units=(1.0,))
+        model = refit.model.with_effects({gain: size})
+        fit = replace(
+            refit, effects=("torque_gain",), space=space, model=model, solution=solution
+        )
+        found = cell_estimates(fit, fitter, {}, {"torque_gain": refit})
+        assert 0.05 < found[gain].high - found[gain].low < 0.2
+        assert beyond_zero("torque_gain", found, 0.0) is there
 
 
 def test_intervals_tell_of_a_valley_along_which_parameters_replace_each_other():
