@@ -7,15 +7,17 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.optimize import brentq
 
 from fjr_records.records import RecordSet
 
 from ..model.evidence import Evidence
 from ..model.rig_model import Model
-from ..which.cell_fits import NOTHING_LEFT
+from ..which.cell_fits import ENOUGH, NOTHING_LEFT
 from ..which.gains import LEAST_GAIN
 from ..which.scales import Scales
 
+_FARTHEST = 30.0  # logarithm of the factors within which a size is looked for
 RECORDS = 3
 """Records of each level that are simulated: one for each purpose of a diagnosis."""
 
@@ -72,8 +74,12 @@ class Sight:
         self._levels_of = np.array([p.level for p in self._evidence.parts])[part]
         self._judged = np.isin(part, judged)
         bands = self._evidence.bands
-        _, self._bins = np.unique(part[self._judged] * bands + cell[self._judged] % bands,
-                                  return_inverse=True)  # fmt: skip
+        own = part[self._judged] * bands + cell[self._judged] % bands
+        bins, self._bins = np.unique(own, return_inverse=True)
+        self._counts = np.bincount(self._bins)
+        level = np.array([p.level for p in self._evidence.parts])[bins // bands]
+        _, self._cells = np.unique(level * bands + bins % bands, return_inverse=True)
+        self._numbers = np.bincount(self._cells, self._counts)
         self._count = len(judged)
 
     def errors(self, models: Sequence[Model]) -> np.ndarray:
@@ -86,17 +92,28 @@ class Sight:
         return any(simulator.too_stiff(model, i) for i in range(len(simulator.records.records)))
 
     def strength(self, change: np.ndarray) -> float:
-        """Return how far a change shows, over what the diagnosis needs to name an effect.
+        """Return how many times smaller a change may be for a diagnosis still to name an effect.
 
-        Two things are needed (`stepwise`): without the effect, more than noise must be left, and an
-        unseen part must gain enough log-likelihood by it, of which each band has
-        n/2 ln(1 + mean square of the change over that of noise).
+        Two things are needed (`stepwise`): without the effect, more than noise must be left in some
+        band of a level, and an unseen part must gain enough log-likelihood by it, of which each
+        band has n/2 ln(1 + mean square of the change over that of noise).
         """
-        counts = np.bincount(self._bins)
-        squares = np.bincount(self._bins, change[self._judged] ** 2) / counts
-        gain = 0.5 * float(np.sum(counts * np.log1p(squares))) / self._count
-        left = float(np.mean(change[self._judged] ** 2))
-        return math.sqrt(min(gain / LEAST_GAIN, left / (NOTHING_LEFT - 1.0)))
+        squares = np.bincount(self._bins, change[self._judged] ** 2) / self._counts
+        totals = np.bincount(self._cells, squares * self._counts) / self._numbers
+        enough = self._numbers >= min(ENOUGH, self._numbers.max())
+        left = math.sqrt(max(float(totals[enough].max()), 0.0) / (NOTHING_LEFT - 1.0))
+        if not np.isfinite(squares).all():
+            return math.inf
+
+        def lacks(logarithm: float) -> float:
+            smaller = squares * math.exp(-2.0 * logarithm)
+            return LEAST_GAIN - 0.5 * float(self._counts @ np.log1p(smaller)) / self._count
+
+        low, high = -_FARTHEST, _FARTHEST
+        if lacks(low) > 0.0:
+            return 0.0
+        gained = math.exp(high if lacks(high) < 0.0 else brentq(lacks, low, high, xtol=1e-6))
+        return min(gained, left)
 
     def best_level(self, change: np.ndarray) -> int:
         """Return the index of the level at which a change shows best."""

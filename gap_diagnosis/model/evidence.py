@@ -117,7 +117,7 @@ class Evidence:
 
     @property
     def band_hz(self) -> float:
-        """Highest frequency that is excited, as far as that is known; lines above hold harmonics."""
+        """Highest frequency that is excited, where that is known; lines above hold harmonics."""
         top_hz = self.lines * self.line_hz
         return min(top_hz, self.records.top_hz) if isinstance(self.records, SteadyRuns) else top_hz
 
@@ -136,9 +136,25 @@ class Evidence:
         """Variance of the noise of an error in each cell, (cells,), rad2; 0 where not known."""
         if not self.noise.known:
             return np.zeros(self.cells)
+        if isinstance(self.records, SteadyRuns) and not self.noise.rounds:
+            seen = self._scattered(self.records.scatter)
+            if seen is not None:
+                return np.tile(seen, len(self.records.levels))
         cycles = 0.5 * (np.arange(self.lines) + 0.5) / self.hop
         of_band = np.add.reduceat(self.noise.power(cycles), self.edges[:-1]) / np.diff(self.edges)
         return np.tile(of_band, len(self.records.levels))
+
+    def _scattered(self, scatter: Sequence[np.ndarray]) -> np.ndarray | None:
+        """Return the variance in each band by what differs between periods, (bands,).
+
+        In a loop noise is not white: the controller answers that of the encoder. None for one
+        period, or where periods are equal.
+        """
+        rows = np.concatenate([lapped(row, self.hop).reshape(-1, self.hop) for row in scatter])
+        if not rows.any():
+            return None
+        squares = np.mean(rows[:, : self.lines] ** 2, axis=0)
+        return np.add.reduceat(squares, self.edges[:-1]) / np.diff(self.edges)
 
     @property
     def player(self) -> RecordSimulator:

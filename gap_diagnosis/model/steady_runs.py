@@ -30,11 +30,14 @@ class SteadyRuns(RecordSet):
         run_in: samples before the steady period, which are not compared.
         noise: of the positions in it.
         top_hz: highest frequency that is excited.
+        scatter: of each run, what differs between its periods, times what makes of that one draw of
+            the noise of their mean, float64 (differences, N) in rad; empty for one period.
     """
 
     run_in: int = 0
     noise: RecordNoise | None = None
     top_hz: float = math.inf
+    scatter: tuple[np.ndarray, ...] = ()
 
 
 def steady_runs(recorded: RecordedExperiment) -> SteadyRuns:
@@ -52,9 +55,17 @@ def steady_runs(recorded: RecordedExperiment) -> SteadyRuns:
             "select and to report."
         )
     run_in = max(description.transient_periods, 1) * description.samples_per_period
+    scatter = tuple(_scatter(recorded.realizations[i]) for i in chosen)
     top_hz = max(description.excited_harmonics) * description.base_frequency_hz
     return SteadyRuns(
-        recorded.source, recorded.sample_rate_hz, records, tuple(notes), run_in, mean, top_hz
+        recorded.source,
+        recorded.sample_rate_hz,
+        records,
+        tuple(notes),
+        run_in,
+        mean,
+        top_hz,
+        scatter,
     )
 
 
@@ -64,6 +75,12 @@ def _of_mean(noise: RecordNoise, periods: int) -> RecordNoise:
     if noise.rounds:
         return replace(noise, seen_rad=seen)
     return replace(noise, std_rad=noise.std_rad / math.sqrt(periods), seen_rad=seen)
+
+
+def _scatter(run: RecordedRealization) -> np.ndarray:
+    """Return differences between successive periods, of the variance of the noise of their mean."""
+    periods = run.kept(run.position)
+    return np.diff(periods, axis=0) / math.sqrt(2.0 * len(periods))
 
 
 def compared(recorded: RecordedExperiment) -> list[int]:

@@ -108,6 +108,8 @@ def _steady_plots(
     levels = [f"Level {one.level}, {one.amplitude_rad:.3g} rad" for one in found]
     for plots, level in zip(by_level, found, strict=True):
         plots |= level_plots(level)
+        if view.models:
+            plots.pop("time")  # the runs that were fitted are shown over time already
     if not view.models:
         return by_level, levels, {}
     before, after = view.residual_torques["refit"], view.residual_torques["explained"]

@@ -39,7 +39,7 @@ RIPPLES_TRIED = 3
 NOTHING_LEFT = 2.0
 """Mean squared error over noise below which noise explains what is left."""
 _RIVAL = 0.05  # an error: a second start that costs so much more than the first is not pursued
-_ENOUGH = 24  # numbers of a band, of which chance seldom doubles the mean square
+ENOUGH = 24  # numbers of a band, of which chance seldom doubles the mean square
 _ACTS = (
     0.1  # of what is left in a band of a part: an effect that moves it by less does not act there
 )
@@ -265,7 +265,7 @@ class CellFitter:
         for level in np.unique(weights.select_levels):
             own = weights.select_levels == level
             numbers = weights.counts[own].sum(axis=0)
-            enough = numbers >= _ENOUGH
+            enough = numbers >= ENOUGH
             if enough.any():
                 worst = max(worst, float((relative[own].sum(axis=0) / numbers)[enough].max()))
         return worst

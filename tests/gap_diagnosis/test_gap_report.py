@@ -178,7 +178,7 @@ def test_texts_from_bags_cannot_become_code(found):
     hostile = dataclasses.replace(found, recorded=recorded, steady=view, diagnosis=diagnosis)
     made = Page(rendered(hostile, {"command": EVIL}))
     assert len(made.scripts) == 3 and not any(tag == "img" for tag, _ in made.tags)
-    assert made.texts.count(EVIL) == 4  # folder, command, note, proposal
+    assert made.texts.count(EVIL) == 5  # folder, command, note, proposal, bags
 
 
 def test_the_maps_hold_sigma_of_every_line(page, found):
