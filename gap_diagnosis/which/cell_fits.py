@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
+from scipy import stats
 
 from fjr_sim_node import effects as fx
 
@@ -39,7 +40,7 @@ RIPPLES_TRIED = 3
 NOTHING_LEFT = 2.0
 """Mean squared error over noise below which noise explains what is left."""
 _RIVAL = 0.05  # an error: a second start that costs so much more than the first is not pursued
-ENOUGH = 24  # numbers of a band, of which chance seldom doubles the mean square
+_CHANCE = 1e-4  # that noise leaves as much in a band: then something else is left there
 _ACTS = (
     0.1  # of what is left in a band of a part: an effect that moves it by less does not act there
 )
@@ -254,9 +255,10 @@ class CellFitter:
         return float(np.sum(self.weights.counts * relative) / self.weights.counts.sum())
 
     def left_in_a_band(self, fit: CellFit) -> float:
-        """Return the misfit in the band of the level in which a fit leaves most; NaN as above.
+        """Return the misfit in the band of the level in which a fit leaves most beyond chance.
 
-        A cause that acts in a narrow band hardly shows in the mean over all.
+        A cause that acts in a narrow band hardly shows in the mean over all. NaN as above; 0 where
+        chance explains what is left in every band.
         """
         if not self.evidence.noise.known:
             return math.nan
@@ -264,10 +266,11 @@ class CellFitter:
         relative = weights.counts * (fit.left / weights.select_floor - 1.0)
         for level in np.unique(weights.select_levels):
             own = weights.select_levels == level
-            numbers = weights.counts[own].sum(axis=0)
-            enough = numbers >= ENOUGH
-            if enough.any():
-                worst = max(worst, float((relative[own].sum(axis=0) / numbers)[enough].max()))
+            numbers, squares = weights.counts[own].sum(axis=0), relative[own].sum(axis=0)
+            chance = stats.chi2.sf(squares, np.maximum(numbers, 1))
+            seen = (chance < _CHANCE) & (numbers > 0)
+            if seen.any():
+                worst = max(worst, float((squares / np.maximum(numbers, 1))[seen].max()))
         return worst
 
     def gains(self, after: CellFit, before: CellFit) -> np.ndarray:

@@ -131,9 +131,7 @@ def test_a_gain_is_known_as_far_as_the_datasheet_is():
         )
         space = replace(refit.space, effects=(gain,), units=(1.0,))
         model = refit.model.with_effects({gain: size})
-        fit = replace(
-            refit, effects=("torque_gain",), space=space, model=model, solution=solution
-        )
+        fit = replace(refit, effects=("torque_gain",), space=space, model=model, solution=solution)
         found = cell_estimates(fit, fitter, {}, {"torque_gain": refit})
         assert 0.05 < found[gain].high - found[gain].low < 0.2
         assert beyond_zero("torque_gain", found, 0.0) is there
@@ -147,7 +145,7 @@ def test_intervals_tell_of_a_valley_along_which_parameters_replace_each_other():
     refit = fitter.refit()
     screening = fitter.screening(refit, "encoder_eccentricity")
     fit = fitter.further(fitter.add(refit, "encoder_eccentricity", screening.proposals()))
-    assert fitter.misfit(fit) < 1.2
+    assert fitter.misfit(fit) < 1.3
     found = cell_estimates(fit, fitter, {}, {"encoder_eccentricity": refit})
     for name, value in case.truth.plant.items():
         std = (found[name].high - found[name].low) / 3.92

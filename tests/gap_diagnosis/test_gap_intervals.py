@@ -73,7 +73,7 @@ def test_the_position_is_that_of_the_realizations_that_no_fit_has_seen(case, fou
         mean = r.kept(r.position).mean(0)
         errors.append(np.mean((found[1]["refit"][0][index] - mean) ** 2) / np.var(mean))
     whole = np.sqrt(np.mean(errors))
-    assert found[0]["position"].refit.value == pytest.approx(whole, rel=0.1)  # of half the blocks
+    assert found[0]["position"].refit.value == pytest.approx(whole, rel=0.25)  # of half the blocks
 
 
 def test_the_gap_of_a_step_is_the_figure_without_its_interval(case, found):
