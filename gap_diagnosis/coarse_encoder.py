@@ -170,7 +170,7 @@ def _told(
     ]
     ends = {"nominal": steps[0], "refit": steps[1], "explained": steps[-1]}
     models = {"nominal": nominal, "refit": refit, "explained": rounded}
-    figures = GapFigures(**ledger.figures(models, closes=moves or bool(diagnosis.causes)))
+    figures = GapFigures(**ledger.figures(models, closes=bool(diagnosis.causes)))
     closed = None if figures.position is None else figures.position.closed
     told = {
         "verdict": _verdict(causes, steps[-1]),

@@ -85,7 +85,8 @@ def _unsteady(view: SteadyView, nominal: Model, order: Order) -> Investigation:
     """Diagnose whole runs of periods that do not repeat; where nothing is named, a drift may be."""
     whole = investigate_runs(view.recorded.as_records(), order)
     if whole.diagnosis.causes or whole.fitted is None:
-        return _with(whole, notes=[UNSTEADY, *whole.diagnosis.notes])
+        failed = [gate.sentence for gate in view.gates.failures]
+        return _with(whole, notes=[UNSTEADY, *failed, *view.gates.notes, *whole.diagnosis.notes])
     order.progress("drift within runs")
     gate = drift_gate(whole.fitted.fitter, whole.fitted.found.steps[0])
     gates = replace(view.gates, gates=(*view.gates.gates, gate))

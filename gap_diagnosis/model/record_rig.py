@@ -31,6 +31,9 @@ _FIRST_SAMPLES, _HIGHEST_DEGREE = 10, 4
 _SETTLED = (1e-6, 1e-4)
 """Least and greatest part of the rms position that is left of a transient; between them the noise
 of a line, for a tail that lies in one line must not count there."""
+_BENT = {"jm": 1.1, "j": 1.1, "fs": 1.2, "fsm": 1.2, "fv": 1.2, "fvm": 1.2, "k0": 0.9}
+"""Factors on the parameters of a model that must forget the state of the one it begins near."""
+_FORGOTTEN = 3.0  # times what may be left of a transient
 _SLOWER = 1.5  # times as long as it took the model that is simulated first
 _REST_POWERS = 2, 3, 4  # of time, by which a motion from rest begins
 _ONLY_NOISE = 1.1  # standard deviations that a fit to the first samples leaves by chance
@@ -226,7 +229,27 @@ class RecordSimulator:
         now = drive.elapsed_s + begin / self._rate
         middle = float(first.motor[run_in:].mean())
         rig.complete(until.end.rig, float(until.torque[-1]), now, middle)
-        return begin, until.end
+        found = begin, until.end
+        return found if self._forgets(model, drive, run_in, found, limit) else None
+
+    def _forgets(
+        self, model: Model, drive: Drive, run_in: int, begun: tuple[int, State], limit: float
+    ) -> bool:
+        """Tell whether another model forgets in which state it began.
+
+        Where friction holds a small motion, the place about which it moves depends on the way
+        there for ever.
+        """
+        bent = {n: v * _BENT.get(n, 1.0) for n, v in model.plant.items()}
+        other = self._coefficients(Model(bent, {}))
+        first, state = begun
+        try:
+            cold = drive.simulated(self._rate, *other).position[run_in:]
+            near = drive.part(slice(first, None), state).simulated(self._rate, *other)
+        except InputError:
+            return False
+        off = near.position[run_in - first :] - cold
+        return float(np.sqrt(np.mean(off**2))) <= _FORGOTTEN * limit
 
     def response(self, frequency_hz: np.ndarray, index: int) -> np.ndarray:
         """Return C_y of what holds a run: its controller, or the observer; complex, N m/rad."""

@@ -40,6 +40,8 @@ RIPPLES_TRIED = 3
 NOTHING_LEFT = 2.0
 """Mean squared error over noise below which noise explains what is left."""
 _RIVAL = 0.05  # an error: a second start that costs so much more than the first is not pursued
+_FURTHER = 4  # times that a fit is taken further at the most
+_STILL_FALLS = 0.8  # of its misfit
 _CHANCE = 1e-4  # that noise leaves as much in a band: then something else is left there
 _ACTS = (
     0.1  # of what is left in a band of a part: an effect that moves it by less does not act there
@@ -105,7 +107,9 @@ class CellFitter:
         space = Space(self.nominal, (), (), self.tolerance, self.scales)
         first = self._begun((), space, space.point(Model(self.nominal, {})))
         left = first.solution.residuals / self.weights.weight(first.variance)
-        return self.further(first) if self.weights.learn(left) else first
+        if self.weights.learn(left):
+            first = self.further(first)
+        return first if self.left_in_a_band(first) < NOTHING_LEFT else self.to_its_end(first)
 
     def screening(self, parent: CellFit, effect: str) -> Screening:
         """Return what the starts of an effect promise beside a fit."""
@@ -210,6 +214,14 @@ class CellFitter:
             fit.effects, fit.space, fit.solution.x, fit.variance, _REFIT_ROUNDS, known
         )
         return replace(ended, acts=fit.acts)
+
+    def to_its_end(self, fit: CellFit) -> CellFit:
+        """Return a fit taken further, and further while what it leaves over noise still falls."""
+        for _ in range(_FURTHER):
+            before, fit = fit, self.further(fit)
+            if not self.misfit(fit) < _STILL_FALLS * self.misfit(before):
+                break
+        return fit
 
     def taken_over(self, fit: CellFit) -> CellFit:
         """Return what the fit of another fitter comes to here, from where it ended there."""

@@ -18,8 +18,6 @@ _PROPOSED, _FITTED, _STARTS = (7, 5), (5, 3), (2, 1)
 """Effects that are tried at several sizes, those of them that are fitted, and from how many starts:
 beside no cause yet, beside others."""
 _POLISHED = 2  # leading fits of a step that are taken further
-_FURTHER = 3  # times that a leading fit is taken further, while what it leaves still falls
-_STILL_FALLS = 0.8  # of the squared error on unseen parts
 _AGAIN = 8  # effects that are screened beside a cause, and those that depend on others
 _OUTDATED = 0.1  # of the squared error that is left: then what was screened before is too far
 _NEARLY_ALL, _MOST = 0.1, 0.5
@@ -157,13 +155,8 @@ class Extension:
         closes_little = left_of(self._fitter, fit, parent) > _OUTDATED
         if fit.solution.converged and closes_little and not alike:
             return fit
-        for _ in range(_FURTHER):
-            self._progress(f"{' + '.join(fit.effects)}, further")
-            before, fit = fit, self._fitter.further(fit)
-            falls = left_of(self._fitter, fit, before) < _STILL_FALLS
-            if fit.solution.converged or not falls or self._fitter.misfit(fit) < WORTH_A_HARMONIC:
-                break
-        return fit
+        self._progress(f"{' + '.join(fit.effects)}, further")
+        return self._fitter.to_its_end(fit)
 
     def _enriched(self, fit: CellFit, parent: CellFit) -> CellFit:
         """Return a fit whose last effect is a ripple with its second harmonic, if that repeats.

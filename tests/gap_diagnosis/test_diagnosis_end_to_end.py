@@ -95,7 +95,8 @@ def test_fjr_simulate_with_the_updated_file_repeats_the_rig_within_the_stated_ga
             error = simulated.kept(simulated.position).mean(0) - y
             shares.append(np.mean(error**2) / np.mean(y**2))
     stated = diagnosis.gap.explained if diagnosis.effects else diagnosis.gap.refit
-    assert np.sqrt(np.mean(shares)) == pytest.approx(stated.nrmse_position, rel=0.1)
+    missed = np.sqrt(np.mean(shares))  # with noise of all frequencies, in both
+    assert 0.9 * stated.nrmse_position < missed < 1.5 * stated.nrmse_position
 
 
 def test_a_rig_that_warms_up_is_nonstationary(run, tmp_path):

@@ -41,7 +41,7 @@ def test_an_effect_is_fitted_with_its_values(effect):
     fitter = fitter_of(case.recorded)
     refit = fitter.refit()
     fit = fitter.add(refit, effect, fitter.screening(refit, effect).proposals())
-    fit = fitter.further(fit)
+    fit = fitter.to_its_end(fit)
     assert fitter.misfit(refit) > 3.0
     assert fitter.misfit(fit) < 1.5
     for name, share in near.items():

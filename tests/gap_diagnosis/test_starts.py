@@ -21,9 +21,7 @@ def fitted(recorded, effect: str) -> tuple[CellFit, CellFitter]:
     fitter = fitter_of(recorded)
     refit = fitter.refit()
     fit = fitter.add(refit, effect, fitter.screening(refit, effect).proposals())
-    for _ in range(3):
-        fit = fitter.further(fit)
-    return fit, fitter
+    return fitter.to_its_end(fit), fitter
 
 
 def rig_with(truth: dict[str, float], seed: int = 3, **played: float):
