@@ -216,12 +216,20 @@ class CellFitter:
         return replace(ended, acts=fit.acts)
 
     def to_its_end(self, fit: CellFit) -> CellFit:
-        """Return a fit taken further, and further while what it leaves over noise still falls."""
+        """Return a fit taken further, and further while what it leaves over noise still falls.
+
+        Weighed by what itself leaves, a fit may stay where it misses much in a cell, which then
+        counts for little. So it is also begun with the weights of noise, and the better one counts.
+        """
         for _ in range(_FURTHER):
             before, fit = fit, self.further(fit)
             if not self.misfit(fit) < _STILL_FALLS * self.misfit(before):
                 break
-        return fit
+        if not self.left_in_a_band(fit) > NOTHING_LEFT:
+            return fit
+        noise = self.weights.floor
+        other = self._reweighted(fit.effects, fit.space, fit.solution.x, noise, _REFIT_ROUNDS)
+        return replace(other, acts=fit.acts) if self.gains(other, fit).sum() > 0.0 else fit
 
     def taken_over(self, fit: CellFit) -> CellFit:
         """Return what the fit of another fitter comes to here, from where it ended there."""
