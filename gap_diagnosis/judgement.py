@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 
 from .gates.gate_checks import GateReport
@@ -26,6 +25,7 @@ from .outcome.diagnosis import (
 )
 from .tested_causes import Tested
 from .which.cell_fits import NOTHING_LEFT, CellFit, CellFitter
+from .which.estimates import linear_estimates, standard_errors
 from .which.found import Found
 from .which.gains import gain
 from .which.presence import (
@@ -196,16 +196,16 @@ def _ranking(fitter: CellFitter, found: Found) -> list[Candidate]:
     for count, fits in found.rivals.items():
         parent = found.steps[min(count, len(found.steps)) - 1]
         for fit in fits:
+            solution = fit.solution
+            std = standard_errors(solution.jacobian, solution.residuals, fitter.groups)
+            estimates = linear_estimates(fit, std)
             ranked.append(
                 Candidate(
                     effects=list(fit.effects),
                     held_out_chi2=fitter.misfit(fit),
                     delta=gain(fitter, fit, parent).mean,
-                    converged=fit.solution.converged,
-                    parameters={
-                        n: {"value": fit.model.effects[n], "low": math.nan, "high": math.nan}
-                        for n in fit.space.effects
-                    },
+                    converged=solution.converged,
+                    parameters={name: estimates[name] for name in fit.space.effects},
                 )
             )
     return ranked

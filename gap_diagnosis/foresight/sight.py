@@ -8,16 +8,16 @@ from dataclasses import replace
 
 import numpy as np
 from scipy.optimize import brentq
+from scipy.stats import chi2
 
 from fjr_records.records import RecordSet
 
 from ..model.evidence import Evidence
 from ..model.rig_model import Model
-from ..which.cell_fits import NOTHING_LEFT
+from ..which.cell_fits import CHANCE, NOTHING_LEFT
 from ..which.gains import LEAST_GAIN
 from ..which.scales import Scales
 
-_ENOUGH = 8  # numbers of a band, in which noise hardly hides what leaves twice as much
 _FARTHEST = 30.0  # logarithm of the factors within which a size is looked for
 RECORDS = 3
 """Records of each level that are simulated: one for each purpose of a diagnosis."""
@@ -101,8 +101,8 @@ class Sight:
         """
         squares = np.bincount(self._bins, change[self._judged] ** 2) / self._counts
         totals = np.bincount(self._cells, squares * self._counts) / self._numbers
-        enough = self._numbers >= min(_ENOUGH, self._numbers.max())
-        left = math.sqrt(max(float(totals[enough].max()), 0.0) / (NOTHING_LEFT - 1.0))
+        beyond = np.maximum(NOTHING_LEFT, chi2.isf(CHANCE, self._numbers) / self._numbers) - 1.0
+        left = math.sqrt(max(float((totals / beyond).max()), 0.0))
         if not np.isfinite(squares).all():
             return math.inf
 

@@ -42,7 +42,7 @@ NOTHING_LEFT = 2.0
 _RIVAL = 0.05  # an error: a second start that costs so much more than the first is not pursued
 _FURTHER = 4  # times that a fit is taken further at the most
 _STILL_FALLS = 0.8  # of its misfit
-_CHANCE = 1e-4  # that noise leaves as much in a band: then something else is left there
+CHANCE = 1e-4  # that noise leaves as much in a band: then something else is left there
 _ACTS = (
     0.1  # of what is left in a band of a part: an effect that moves it by less does not act there
 )
@@ -288,7 +288,7 @@ class CellFitter:
             own = weights.select_levels == level
             numbers, squares = weights.counts[own].sum(axis=0), relative[own].sum(axis=0)
             chance = stats.chi2.sf(squares, np.maximum(numbers, 1))
-            seen = (chance < _CHANCE) & (numbers > 0)
+            seen = (chance < CHANCE) & (numbers > 0)
             if seen.any():
                 worst = max(worst, float((squares / np.maximum(numbers, 1))[seen].max()))
         return worst

@@ -170,7 +170,7 @@ def test_a_coarse_encoder_under_few_counts_is_named_and_the_parameters_are_right
     assert found.verdict == "effect" and found.effects == [ROUNDING]
     steps = [step.chi2_per_dof for step in found.steps]
     assert steps[1] > 5.0 * steps[2] and steps[2] < 2.0
-    assert found.gap_closed > 0.7 and found.causes[0].share.low > 0.5
+    assert found.gap_closed is None and found.causes[0].share.low > 0.5
     for name in ("jm", "j", "k0"):
         true = few_counts.truth.plant[name]
         assert found.parameters[name].value == pytest.approx(true, rel=0.03)
