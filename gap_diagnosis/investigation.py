@@ -189,7 +189,7 @@ def investigate_runs(
     progress("scatter from run to run")
     bags, scatter, said = _run_scatter(fitter, found.best)
     heard += said
-    found, tested = kept(fitter, found, scatter, progress, names)
+    found, tested = kept(fitter, found, scatter, progress, names, until)
     if (tested or not names) and _misses(fitter, found.best) >= 1.0:
         found, tested = replace(found, steps=found.steps[:1]), []
         heard.append(LOST)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
@@ -31,6 +33,7 @@ def kept(
     scatter: Mapping[str, float],
     progress: Progress,
     names: Sequence[str],
+    until: float = math.inf,
 ) -> tuple[Found, list[Tested]]:
     """Take out, one at a time, the causes that do not pass the tests beside the others.
 
@@ -47,6 +50,7 @@ def kept(
         scatter: of parameters from run to run, see `moved_by_scatter`.
         progress: told what is tested.
         names: identifiers of what may be named.
+        until: when nothing is tried in place of a cause any more (s, `time.monotonic`).
 
     Returns:
         the steps that are left, and the tests of their causes.
@@ -66,7 +70,8 @@ def kept(
         blurred = any(t.passes_beside_size and not t.certain for t in failed)
         weakest = min(tested if blurred else failed, key=lambda t: t.gain.mean)
         before = [fit for fit in steps if weakest.effect not in fit.effects]
-        if weakest.effect not in replaced and len(steps[-1].effects) > 1:
+        in_time = time.monotonic() < until
+        if in_time and weakest.effect not in replaced and len(steps[-1].effects) > 1:
             replaced.add(weakest.effect)
             other = _in_its_place(fitter, found, steps[-1], weakest, names)
             if other is not None:
