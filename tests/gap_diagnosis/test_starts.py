@@ -77,7 +77,7 @@ def test_lugre_friction_begins_as_the_part_of_it_that_was_fitted():
         beside = {n: v for n, v in part.items() if n.startswith("coulomb_friction.")}
         whole = beside | begins(part, case.truth.plant)
         models = [Model(case.truth.plant, effects) for effects in (part, whole)]
-        as_part, as_whole = simulator.many(models)
+        as_part, as_whole = (simulator.signals(model) for model in models)
         np.testing.assert_array_equal(as_whole, as_part)
 
 
