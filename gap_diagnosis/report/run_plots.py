@@ -142,8 +142,8 @@ def tried_plot(ranking: Sequence[Candidate]) -> Plot | None:
         note = f"{PLAIN}<extra>%{{fullData.name}}</extra>"
         options: Options = {"symbol": "circle", "size": 9, "hovertemplate": note}
         traces.append(trace(gains, at[chosen], f"step {step}", color, **options))
-    axes = layout("gain of log-likelihood per number, on data that select", "")
-    axes["xaxis"] |= {"zeroline": True, "zerolinecolor": "--muted"}
+    axes = layout("gain of log-likelihood of a block that selects (nats)", "")
+    axes["xaxis"] |= {"zeroline": True, "zerolinecolor": "--muted", "rangemode": "tozero"}
     axes["yaxis"] |= {
         "tickvals": numbers(at),
         "ticktext": [f"{len(c.effects)}: {explanation(c.effects[-1:])}" for c in shown],
