@@ -16,8 +16,8 @@ from fjr_kit.errors import InputError
 from fjr_records.records import Record, RecordSet, read_records, reference_optional
 from fjr_sim_node import effects, plant
 from fjr_sim_node.simulation.closed_loop import Trajectory
+from gap_diagnosis.model.drive import Drive
 from gap_diagnosis.model.evidence import Evidence
-from gap_diagnosis.model.record_rig import Drive
 
 from .joint import Joint
 from .result import RecordReplay

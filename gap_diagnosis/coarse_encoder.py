@@ -23,7 +23,8 @@ from .model.rig_model import Model
 from .notes import rounding
 from .outcome.diagnosis import Cause, Diagnosis, Estimate, Gap, GapFigures, Gaps, Step, Verdict
 from .outcome.verdict_words import ROUNDING
-from .which.cell_fits import NOTHING_LEFT, CellFit, CellFitter
+from .which.cell_fits import CellFitter
+from .which.comparison import NOTHING_LEFT, CellFit
 from .which.found import Found
 from .which.rounding import STEP, step_of, with_step
 

@@ -33,7 +33,8 @@ from .outcome.verdict_words import OUT_OF_TIME, ROUNDING
 from .tested_causes import Tested
 from .torque_timing import Timing, timed
 from .which.catalogue import catalogue
-from .which.cell_fits import NOTHING_LEFT, CellFit, CellFitter
+from .which.cell_fits import CellFitter
+from .which.comparison import NOTHING_LEFT, CellFit
 from .which.equivalents import founded, partners
 from .which.estimates import moved_by_scatter, relative_scatter
 from .which.found import Found

@@ -24,7 +24,8 @@ from .outcome.diagnosis import (
     Verdict,
 )
 from .tested_causes import Tested
-from .which.cell_fits import NOTHING_LEFT, CellFit, CellFitter
+from .which.cell_fits import CellFitter
+from .which.comparison import NOTHING_LEFT, CellFit
 from .which.estimates import linear_estimates, standard_errors
 from .which.found import Found
 from .which.gains import gain

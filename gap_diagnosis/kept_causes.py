@@ -12,7 +12,8 @@ from fjr_sim_node import effects as fx
 from .judgement import FEWEST_PARTS
 from .outcome.verdict_words import explanation
 from .tested_causes import Tested, causes_with_tests
-from .which.cell_fits import CellFit, CellFitter
+from .which.cell_fits import CellFitter
+from .which.comparison import CellFit
 from .which.equivalents import founded, partners
 from .which.found import Found
 from .which.gains import gain, stands_for

@@ -14,7 +14,7 @@ from fjr_records.records import RecordSet
 
 from ..model.evidence import Evidence
 from ..model.rig_model import Model
-from ..which.cell_fits import CHANCE, NOTHING_LEFT
+from ..which.comparison import CHANCE, NOTHING_LEFT
 from ..which.gains import LEAST_GAIN
 from ..which.scales import Scales
 

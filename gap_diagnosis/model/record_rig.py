@@ -8,26 +8,24 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
 
 import numpy as np
 
-from controller_node.transfer_function import TransferFunction
 from fjr_kit.errors import InputError
 from fjr_records.record_noise import RecordNoise
-from fjr_records.records import Record, RecordSet
+from fjr_records.records import RecordSet
 from fjr_sim_node.simulation import rig
-from fjr_sim_node.simulation.closed_loop import State, Trajectory, simulate_law
+from fjr_sim_node.simulation.closed_loop import State
 
+from .drive import Drive
 from .prediction import CROSSOVER_SHARE, model_observer
 from .record_loop import RecordLoop, loop_of, without_erratic, without_swinging
+from .record_start import start_of
 from .rig_model import Model, too_stiff
 from .simulated_rig import run_parallel
 from .steady_runs import SteadyRuns
 
 _SMALL = 1e-4  # relative: a change of an inertia that must not grow
-_AT_REST = 5.0  # standard deviations of noise that a record at rest may begin away from zero
-_FIRST_SAMPLES, _HIGHEST_DEGREE = 10, 4
 _SETTLED = (1e-6, 1e-4)
 """Least and greatest part of the rms position that is left of a transient; between them the noise
 of a line, for a tail that lies in one line must not count there."""
@@ -35,72 +33,6 @@ _BENT = {"jm": 1.1, "j": 1.1, "fs": 1.2, "fsm": 1.2, "fv": 1.2, "fvm": 1.2, "k0"
 """Factors on the parameters of a model that must forget the state of the one it begins near."""
 _FORGOTTEN = 3.0  # times what may be left of a transient
 _SLOWER = 1.5  # times as long as it took the model that is simulated first
-_REST_POWERS = 2, 3, 4  # of time, by which a motion from rest begins
-_ONLY_NOISE = 1.1  # standard deviations that a fit to the first samples leaves by chance
-
-
-@dataclass(frozen=True)
-class Drive:
-    """What drives a simulation of one run: the loop that was recorded, or an observer.
-
-    Attributes:
-        reference: r of the law, float64 (samples,) in rad: the recorded one, or the recorded
-            position where an observer holds the motion to it.
-        law: the controller, or the observer.
-        command: recorded torque that drives the model, (samples,) in N m; None in the loop.
-        added: recorded torque that the law does not make, likewise; None where it makes all.
-        start: position (rad) and velocity (rad/s) that the encoder reads at the first sample.
-        entry: state of the law before it; None for zero.
-        elapsed_s: time since the first run began, for what drifts.
-        begin: state in which the simulation begins, whatever start and entry say.
-    """
-
-    reference: np.ndarray
-    law: TransferFunction
-    command: np.ndarray | None
-    start: tuple[float, float]
-    entry: np.ndarray | None = None
-    elapsed_s: float = 0.0
-    added: np.ndarray | None = None
-    begin: State | None = None
-
-    @property
-    def observed(self) -> bool:
-        """Whether an observer takes the place of a controller that is not known."""
-        return self.command is not None
-
-    def simulated(
-        self,
-        sample_rate_hz: float,
-        p: tuple[float, ...],
-        e: np.ndarray | None,
-        noise: np.ndarray | None = None,
-    ) -> Trajectory:
-        """Return the simulated run of a rig.
-
-        Args:
-            sample_rate_hz: rate of the samples.
-            p: from `plant.coefficients`.
-            e: from `effects.coefficients`, or None.
-            noise: of the encoder, (samples,) in rad; None for none.
-
-        Raises:
-            InputError: the motion diverged.
-        """
-        return simulate_law(
-            self.reference, sample_rate_hz, p, self.law, noise, e, self.elapsed_s,
-            command=self.command, added=self.added, start=self.start, controller_state=self.entry,
-            begin=self.begin,
-        )  # fmt: skip
-
-    def part(self, samples: slice, begin: State | None = None) -> Drive:
-        """Return what drives some samples of the run, from a state."""
-        command, added = (
-            None if signal is None else signal[samples] for signal in (self.command, self.added)
-        )
-        return replace(
-            self, reference=self.reference[samples], command=command, added=added, begin=begin
-        )
 
 
 class RecordSimulator:
@@ -131,7 +63,7 @@ class RecordSimulator:
         self._added: Sequence[np.ndarray] | None = None
         self._named = False
         self.loop: RecordLoop = without_swinging(loop_of(records), records)
-        self._starts = [_start(r, noise) for r in records.records]
+        self._starts = [start_of(r, noise) for r in records.records]
         self._speeds = [float(np.std(np.diff(r.position)) * self._rate) for r in records.records]
         self._torques = [float(np.abs(r.torque).max()) for r in records.records]
         self.crossover_hz, self._observer = model_observer(
@@ -353,40 +285,3 @@ class RecordSimulator:
         """Tell whether a model would take so long to play as no record can call for."""
         samples = self.records.records[index].samples
         return too_stiff(model, samples, self._rate, self._speeds[index], self._torques[index])
-
-
-def _start(record: Record, noise: RecordNoise) -> tuple[float, float]:
-    """Return position (rad) and velocity (rad/s) at the first sample; zero where noise explains.
-
-    The polynomial of lowest degree that leaves no more than noise tells a run that begins to move
-    from rest, whose speed grows from zero, from one that moves already. What an encoder of coarse
-    steps rounds away is no chance: there a motion that may begin from rest at zero does.
-    """
-    first = record.position[:_FIRST_SAMPLES]
-    std = noise.std_rad if noise.known else 0.0
-    if np.abs(first).max() <= _AT_REST * std:
-        return 0.0, 0.0
-    if np.ptp(first) <= 2.0 * _AT_REST * std:
-        return float(first.mean()), 0.0
-    time = np.arange(first.size) / record.description.sample_rate_hz
-    if noise.rounds and abs(first[0]) < std and _may_begin_from_rest(first, std):
-        return 0.0, 0.0
-    for degree in range(1, _HIGHEST_DEGREE + 1):
-        powers = np.vander(time / time[-1], degree + 1, increasing=True)
-        found = np.linalg.lstsq(powers, first, rcond=None)[0]
-        left = first - powers @ found
-        scatter = float(np.sqrt(left @ left / (first.size - found.size)))
-        if scatter <= _ONLY_NOISE * std:
-            break
-    error = max(scatter, std) * np.sqrt(np.diag(np.linalg.inv(powers.T @ powers)))
-    if np.all(np.abs(found[:2]) <= _AT_REST * error[:2]):
-        return 0.0, 0.0
-    return float(found[0]), float(found[1] / time[-1])
-
-
-def _may_begin_from_rest(first: np.ndarray, std: float) -> bool:
-    """Tell whether a motion from rest at zero leaves no more than noise of its first samples."""
-    time = np.linspace(0.0, 1.0, first.size)
-    powers = np.stack([time**power for power in _REST_POWERS], axis=1)
-    left = first - powers @ np.linalg.lstsq(powers, first, rcond=None)[0]
-    return float(np.sqrt(left @ left / (first.size - len(_REST_POWERS)))) <= _ONLY_NOISE * std

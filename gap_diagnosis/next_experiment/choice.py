@@ -25,7 +25,7 @@ from fjr_sim_node.simulation.closed_loop import simulate
 from ..model.rig_model import Model
 from ..model.simulated_rig import last_samples, run_parallel
 from ..outcome.diagnosis import NextExperiment
-from ..which.cell_fits import CellFit
+from ..which.comparison import CellFit
 from .trials import Trial, trials
 
 LEAST_SIGMA = 10.0

@@ -9,89 +9,53 @@ for is said in `cell_weights`.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from scipy import stats
 
 from fjr_sim_node import effects as fx
 
 from ..model.evidence import Evidence
 from ..model.rig_model import Model
-from .cell_weights import CellWeights
+from .comparison import NOTHING_LEFT, CellFit, Comparison
 from .from_parts import from_part
-from .least_squares import Solution, solve
+from .least_squares import solve
 from .ripples import Ripples
 from .ripples_passed import fewest_cycles
 from .scales import Scales
 from .screening import LARGEST, LARGEST_OF_TORQUES, Proposal, Screening
 from .search_space import Space, space_for, starts
 from .seen_torques import LOADS, SeenTorques
-from .unseen_friction import beside_scatter, deviated
 
 _REFIT_ROUNDS = (8, 5, 5)
 _ADDED_ROUNDS = (6, 4)
 _LEAST_PROMISE = 20.0  # a start that gains less than this (twice the nats) is not pursued
 _STARTS = 2
 RIPPLES_TRIED = 3
-NOTHING_LEFT = 2.0
-"""Mean squared error over noise below which noise explains what is left."""
 _RIVAL = 0.05  # an error: a second start that costs so much more than the first is not pursued
 _FURTHER = 4  # times that a fit is taken further at the most
 _STILL_FALLS = 0.8  # of its misfit
-CHANCE = 1e-4  # that noise leaves as much in a band: then something else is left there
-_ACTS = (
-    0.1  # of what is left in a band of a part: an effect that moves it by less does not act there
-)
 
 
-@dataclass(frozen=True)
-class CellFit:
-    """One explanation after fitting.
-
-    Attributes:
-        effects: identifiers in the order in which they were added.
-        space: what was free.
-        model: the fitted model.
-        solution: the optimiser's end, its residuals and Jacobian times `CellFitter.weight`.
-        variance: (cells,), of an error in each cell, rad2.
-        left: (parts, bands), mean square of what is left on each part that selects, noise and the
-            simulation's own error added, rad2.
-        acts: (parts,), whether the effect that was added last moves a part that selects; None
-            where that was not looked at.
-    """
-
-    effects: tuple[str, ...]
-    space: Space
-    model: Model
-    solution: Solution
-    variance: np.ndarray
-    left: np.ndarray
-    acts: np.ndarray | None = None
-
-
-class CellFitter:
+class CellFitter(Comparison):
     """Fits explanations to the evidence of records.
 
     Attributes:
-        evidence: the records.
         nominal: datasheet values of the base parameters.
         tolerance: how far one may be off, relative.
-        weights: of the errors of its fits.
-        fit_parts, select_parts: indices of parts.
+        fit_parts: indices of the parts that it fits.
         groups: (errors,), the stretch of time of each error of the fit, by its first part.
         runs: (errors,), the record of each error of the fit.
     """
 
     def __init__(self, evidence: Evidence, nominal: Mapping[str, float], tolerance: float) -> None:
         """Prepare."""
-        self.evidence, self.nominal, self.tolerance = evidence, dict(nominal), tolerance
+        super().__init__(evidence)
+        self.nominal, self.tolerance = dict(nominal), tolerance
         self._rippled: tuple[CellFit, tuple[Ripples, SeenTorques]] | None = None
-        self.weights = CellWeights(evidence)
-        self.fit_parts, self.select_parts = self.weights.fit_parts, self.weights.select_parts
+        self.fit_parts = self.weights.fit_parts
         self.groups, self.runs = evidence.stretch_of(self.fit_parts), self.weights.runs
         records = evidence.records
         self.scales = Scales.of_record(
@@ -109,7 +73,7 @@ class CellFitter:
         left = first.solution.residuals / self.weights.weight(first.variance)
         if self.weights.learn(left):
             first = self.further(first)
-        return first if self.left_in_a_band(first) < NOTHING_LEFT else self.to_its_end(first)
+        return first if self.left_in_a_band(first) < NOTHING_LEFT else self._while_it_falls(first)
 
     def screening(self, parent: CellFit, effect: str) -> Screening:
         """Return what the starts of an effect promise beside a fit."""
@@ -216,39 +180,28 @@ class CellFitter:
         return replace(ended, acts=fit.acts)
 
     def to_its_end(self, fit: CellFit) -> CellFit:
-        """Return a fit taken further, and further while what it leaves over noise still falls.
+        """Return a fit taken further while what it leaves over noise still falls.
 
         Weighed by what itself leaves, a fit may stay where it misses much in a cell, which then
         counts for little. So it is also begun with the weights of noise, and the better one counts.
         """
-        for _ in range(_FURTHER):
-            before, fit = fit, self.further(fit)
-            if not self.misfit(fit) < _STILL_FALLS * self.misfit(before):
-                break
+        fit = self._while_it_falls(fit)
         if not self.left_in_a_band(fit) > NOTHING_LEFT:
             return fit
         noise = self.weights.floor
         other = self._reweighted(fit.effects, fit.space, fit.solution.x, noise, _REFIT_ROUNDS)
         return replace(other, acts=fit.acts) if self.gains(other, fit).sum() > 0.0 else fit
 
+    def _while_it_falls(self, fit: CellFit) -> CellFit:
+        for _ in range(_FURTHER):
+            before, fit = fit, self.further(fit)
+            if not self.misfit(fit) < _STILL_FALLS * self.misfit(before):
+                break
+        return fit
+
     def taken_over(self, fit: CellFit) -> CellFit:
         """Return what the fit of another fitter comes to here, from where it ended there."""
         return self._begun(fit.effects, fit.space, fit.solution.x)
-
-    def acted(self, fit: CellFit, effect: str) -> np.ndarray:
-        """Return whether an effect moves each part that selects, beside what the fit leaves there.
-
-        A saturation does nothing where it is not reached; what such a part gains or loses says
-        something of the parameters beside it, and of friction that scatters from run to run.
-
-        Returns:
-            bool (parts,).
-        """
-        rest = {n: v for n, v in fit.model.effects.items() if not n.startswith(f"{effect}.")}
-        models = [fit.model, Model(fit.model.plant, rest)]
-        errors = self.evidence.errors(models, self.select_parts)
-        moved = self.weights.mean_squares(errors[1] - errors[0])
-        return np.any(moved >= _ACTS * fit.left, axis=1)
 
     def without(self, fit: CellFit, effect: str) -> CellFit:
         """Return a fit with one effect taken out and all else fitted anew.
@@ -263,55 +216,6 @@ class CellFitter:
         space = replace(fit.space, effects=names, units=units)
         rest = tuple(e for e in fit.effects if e != effect)
         return self._begun(rest, space, space.point(fit.model))
-
-    def misfit(self, fit: CellFit) -> float:
-        """Return what a fit leaves on unseen parts over noise and the simulation's own error.
-
-        A mean over all errors: 1 where nothing else is left; NaN where noise is not known.
-        """
-        if not self.evidence.noise.known:
-            return math.nan
-        relative = fit.left / self.weights.select_floor - 1.0
-        return float(np.sum(self.weights.counts * relative) / self.weights.counts.sum())
-
-    def left_in_a_band(self, fit: CellFit) -> float:
-        """Return the misfit in the band of the level in which a fit leaves most beyond chance.
-
-        A cause that acts in a narrow band hardly shows in the mean over all. NaN as above; 0 where
-        chance explains what is left in every band.
-        """
-        if not self.evidence.noise.known:
-            return math.nan
-        weights, worst = self.weights, 0.0
-        relative = weights.counts * (fit.left / weights.select_floor - 1.0)
-        for level in np.unique(weights.select_levels):
-            own = weights.select_levels == level
-            numbers, squares = weights.counts[own].sum(axis=0), relative[own].sum(axis=0)
-            chance = stats.chi2.sf(squares, np.maximum(numbers, 1))
-            seen = (chance < CHANCE) & (numbers > 0)
-            if seen.any():
-                worst = max(worst, float((squares / np.maximum(numbers, 1))[seen].max()))
-        return worst
-
-    def gains(self, after: CellFit, before: CellFit) -> np.ndarray:
-        """Return the log-likelihood that one fit gains over another on each part that selects.
-
-        With the variance of each band of each part unknown it is n/2 ln(left before/left after),
-        summed over bands of n independent numbers: no part counts by its size, and no outlier by
-        its square.
-
-        Returns:
-            (parts,), nats.
-        """
-        return self.weights.gained(after.left, before.left).sum(axis=1)
-
-    def left_by(self, model: Model, variance: np.ndarray) -> np.ndarray:
-        """Return `CellFit.left` of a model, with weights by such variances of the cells, rad2."""
-        others = deviated(model) if self.weights.unseen else []
-        errors = self.evidence.errors([model, *others], self.select_parts)
-        weight = self.weights.select_weight(variance)
-        alone = beside_scatter(errors, weight, self.weights.unseen)
-        return self.weights.mean_squares(alone) + self.weights.select_floor
 
     def _ripples(self, parent: CellFit) -> tuple[Ripples, SeenTorques]:
         if self._rippled is None or self._rippled[0] is not parent:

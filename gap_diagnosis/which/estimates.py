@@ -18,7 +18,7 @@ from fjr_sim_node import effects as fx
 
 from ..gates.bag_deviations import SCATTERING
 from ..outcome.diagnosis import Bags, Estimate
-from .cell_fits import CellFit
+from .comparison import CellFit
 
 FORM = 0.01
 """Standard deviation of an effect's parameters by the form of its law, relative, where noise

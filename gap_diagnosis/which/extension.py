@@ -8,7 +8,8 @@ import numpy as np
 
 from fjr_sim_node import effects as fx
 
-from .cell_fits import NOTHING_LEFT, CellFit, CellFitter
+from .cell_fits import CellFitter
+from .comparison import NOTHING_LEFT, CellFit
 from .equivalents import ONE_CAUSE, founded, holders, partners, plainness
 from .gains import Gain, gain, left_of, stands_for
 from .harmonics import WORTH_A_HARMONIC, with_second_harmonic

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
-from .cell_fits import CellFit, CellFitter
+from .cell_fits import CellFitter
+from .comparison import CellFit
 
 LEAST_GAIN = 1.0
 """Least mean gain of log-likelihood of an unseen part (nats)."""

@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from .cell_fits import CellFit, CellFitter
+from .cell_fits import CellFitter
+from .comparison import CellFit
 from .ripples_passed import LEAST_PASSED, ripples_passed
 
 WORTH_A_HARMONIC = 1.3

@@ -18,7 +18,8 @@ from fjr_sim_node import effects as fx
 
 from ..model.rig_model import Model
 from ..outcome.diagnosis import Estimate
-from .cell_fits import NOTHING_LEFT, CellFit, CellFitter
+from .cell_fits import CellFitter
+from .comparison import NOTHING_LEFT, CellFit
 from .estimates import (
     FORM,
     FORM_BESIDE,

@@ -22,7 +22,8 @@ from ..model.lapped import lapped
 from ..model.rig_model import Model
 from ..model.simulated_rig import run_parallel
 from ..outcome.verdict_words import ROUNDING
-from .cell_fits import NOTHING_LEFT, CellFit, CellFitter
+from .cell_fits import CellFitter
+from .comparison import NOTHING_LEFT, CellFit
 from .found import Found
 
 Progress = Callable[[str], None]

@@ -10,7 +10,8 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 
-from .cell_fits import NOTHING_LEFT, CellFit, CellFitter
+from .cell_fits import CellFitter
+from .comparison import NOTHING_LEFT, CellFit
 from .exchange import drop_hindering, replace_bounded
 from .extension import Extension
 from .found import Found

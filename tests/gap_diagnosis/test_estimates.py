@@ -11,7 +11,7 @@ from gap_cases import SHORT, fitter_of, simulate_case
 from gap_diagnosis.model.rig_model import Model
 from gap_diagnosis.outcome.cause_words import digits, percent
 from gap_diagnosis.outcome.diagnosis import Estimate
-from gap_diagnosis.which.cell_fits import CellFit
+from gap_diagnosis.which.comparison import CellFit
 from gap_diagnosis.which.estimates import kept_from_zero, linear_estimates, standard_errors
 from gap_diagnosis.which.least_squares import Solution
 from gap_diagnosis.which.presence import beyond_zero, cell_estimates

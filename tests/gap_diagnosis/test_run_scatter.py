@@ -22,7 +22,7 @@ from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.model.rig_model import Model
 from gap_diagnosis.outcome.diagnosis import Bags, Estimate
 from gap_diagnosis.report.randomisation import randomisation_yaml, ranges
-from gap_diagnosis.which.cell_fits import CellFit
+from gap_diagnosis.which.comparison import CellFit
 from gap_diagnosis.which.estimates import moved_by_scatter
 from gap_diagnosis.which.least_squares import Solution
 from gap_diagnosis.which.search_space import Space

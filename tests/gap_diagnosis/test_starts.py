@@ -11,7 +11,8 @@ from fjr_sim_node.effects import EFFECTS
 from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.model.rig_model import Model
 from gap_diagnosis.model.simulated_rig import Simulator
-from gap_diagnosis.which.cell_fits import CellFit, CellFitter
+from gap_diagnosis.which.cell_fits import CellFitter
+from gap_diagnosis.which.comparison import CellFit
 
 pytestmark = pytest.mark.slow
 
