@@ -1,4 +1,4 @@
-"""Interactive plots of a diagnosis of records: over time, by band, missing torque, what was tried.
+"""Interactive plots of the runs: over time, by band, missing torque, what was tried.
 
 Colours and dashes of the models are those of the plots of steady periods.
 """
