@@ -1,4 +1,4 @@
-"""Figures of the runs of a diagnosis: error by band after each step, torque that the model lacks."""
+"""Figures of the runs of a diagnosis: error by band after each step, torque the model lacks."""
 
 from __future__ import annotations
 
