@@ -27,8 +27,8 @@ from fjr_interface.experiment import RecordDescription
 from fjr_records.records import RecordSet
 from fjr_sim_node.plant import PLANT
 from gap_diagnosis import read_nominal
+from gap_diagnosis.any_record import investigate
 from gap_diagnosis.foresight.foresee import foresee
-from gap_diagnosis.record_investigation import investigate_records
 
 TIMES = 10.0
 OFF = 0.05
@@ -94,7 +94,7 @@ def judged(case: Case) -> tuple[Case, str, list[list[str]], list[float]]:
     factors = np.random.default_rng(seed).uniform(1.0 - OFF, 1.0 + OFF, len(PLANT.names))
     rig = {p.name: float(p.default * f) for p, f in zip(PLANT, factors, strict=True)}
     records = played(case.excitation, {**rig, **case.values})
-    diagnosis = investigate_records(records, read_nominal("paper")).diagnosis
+    diagnosis = investigate(records, read_nominal("paper")).diagnosis
     return case, diagnosis.verdict, diagnosis.equivalent, [c.present for c in diagnosis.causes]
 
 

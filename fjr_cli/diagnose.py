@@ -61,7 +61,7 @@ def diagnose(
     from fjr_kit.folder_lock import locked_folder
     from fjr_kit.invocation import call_date, command_line
     from fjr_records.periodic import RecordedExperiment
-    from gap_diagnosis.any_record import investigate_any, read_any
+    from gap_diagnosis.any_record import investigate, read_any
     from gap_diagnosis.model.nominal import read_nominal, refuse_wrong_units
     from gap_diagnosis.report.gap_output import write_diagnosis
     from gap_diagnosis.report.updated_parameters import has_known_law
@@ -83,7 +83,7 @@ def diagnose(
             warning = refuse_wrong_units(recorded, values, nominal)
             if warning:
                 progress.say(f"Warning: {warning}")
-        found = investigate_any(
+        found = investigate(
             recorded,
             values,
             tolerance=tolerance,

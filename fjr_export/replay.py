@@ -16,9 +16,8 @@ from fjr_kit.errors import InputError
 from fjr_records.records import Record, RecordSet, read_records, reference_optional
 from fjr_sim_node import effects, plant
 from fjr_sim_node.simulation.closed_loop import Trajectory
-from gap_diagnosis.investigation import split
+from gap_diagnosis.model.drive import Drive
 from gap_diagnosis.model.evidence import Evidence
-from gap_diagnosis.model.record_rig import Drive
 
 from .joint import Joint
 from .result import RecordReplay
@@ -91,7 +90,7 @@ def runs_of(joint: Joint, records: RecordSet) -> list[Run]:
             motion diverges in all of them.
     """
     evidence = Evidence(records, joint.bare)
-    held = _held_out(records, evidence)
+    held = _held_out(evidence)
     e = effects.coefficients(joint.values)
     p = plant.coefficients(joint.values)
     runs = []
@@ -112,16 +111,10 @@ def runs_of(joint: Joint, records: RecordSet) -> list[Run]:
     return runs
 
 
-def _held_out(records: RecordSet, evidence: Evidence) -> tuple[int, ...]:
-    """Return the runs that the fit of a diagnosis does not see, by its own rules."""
-    runs = records.records
-    if all(isinstance(run.description, Experiment) for run in runs):
-        peaks = [float(np.abs(run.torque).max()) for run in runs]
-        train, held = split([run.level for run in runs], peaks)
-        return held if not set(held) & set(train) else ()
-    unseen = {evidence.parts[part].record for part in evidence.parts_for("report")}
-    seen = {evidence.parts[part].record for part in evidence.parts_for("fit", "select")}
-    return tuple(sorted(unseen - seen))
+def _held_out(evidence: Evidence) -> tuple[int, ...]:
+    """Return the runs that no fit of a diagnosis sees, by its own rules."""
+    fitted = {evidence.parts[part].record for part in evidence.parts_for("fit")}
+    return tuple(sorted({part.record for part in evidence.parts} - fitted))
 
 
 def motions(runs: Collection[Run]) -> list[Trajectory]:

@@ -55,17 +55,25 @@ class RecordNoise:
             not known.
         step_rad: of the encoder; None where the positions show none.
         walks: whether std_rad is that of what each sample adds to the noise of the one before.
+        seen_rad: what scatter from repeat to repeat, or at a standstill, shows, which rounding
+            takes no part in where it repeats; NaN where none does.
     """
 
     source: NoiseSource
     std_rad: float
     step_rad: float | None = None
     walks: bool = False
+    seen_rad: float = math.nan
 
     @property
     def known(self) -> bool:
         """Whether any noise is known, so that something can be significant."""
         return self.source != "none"
+
+    @property
+    def rounds(self) -> bool:
+        """Whether what counts as noise is what the encoder rounds away, since no more is seen."""
+        return self.step_rad is not None and self.std_rad <= self.step_rad / math.sqrt(12.0)
 
     def power(self, cycles: np.ndarray) -> np.ndarray:
         """Return the variance of a line of an orthonormal transform (rad2), of the shape of cycles.
@@ -91,7 +99,9 @@ def record_noise(records: RecordSet) -> RecordNoise:
     seen = _seen(records, rounding)
     if not seen.known and step is not None:
         return RecordNoise("residual", rounding, step)
-    return RecordNoise(seen.source, max(seen.std_rad, rounding), step)
+    scatters = seen.source in ("repeats", "standstill") and seen.std_rad > 0.0
+    by_scatter = seen.std_rad if scatters else math.nan
+    return RecordNoise(seen.source, max(seen.std_rad, rounding), step, seen_rad=by_scatter)
 
 
 def _seen(records: RecordSet, rounding: float) -> RecordNoise:

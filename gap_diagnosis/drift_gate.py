@@ -14,7 +14,8 @@ from fjr_records.records import RecordSet
 from .gates.gate_checks import Gate
 from .model.evidence import Evidence
 from .model.rig_model import Model
-from .which.cell_fits import CellFit, CellFitter
+from .which.cell_fits import CellFitter
+from .which.comparison import CellFit
 from .which.gains import MOST_P, Gain, closed, gain
 from .which.stepwise import LEAST_CLOSED
 

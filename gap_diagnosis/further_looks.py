@@ -14,9 +14,6 @@ from collections.abc import Mapping
 from .investigation import Investigation
 from .notes import at_limits
 from .outcome.diagnosis import Diagnosis
-from .record_investigation import RecordInvestigation
-from .which.cell_fits import CellFit
-from .which.fits import Fit
 from .which.search_space import farthest
 
 WIDER, CLOSER = 5.0, 0.2
@@ -26,25 +23,17 @@ _HALF = 0.5  # of the misfit: what leaves less does clearly better
 _ALIKE = 1.2  # times the misfit: what leaves less does about as well
 _COMMON = 0.2  # range of the logarithms of ratios to the datasheet, within which one gain holds all
 
-Found = Investigation | RecordInvestigation
 
-
-def called_for(found: Found) -> dict[float, str]:
+def called_for(found: Investigation) -> dict[float, str]:
     """Return the further looks to take: how many tolerances for one, and what that supposes.
 
     None, unless a fit ended as far from the datasheet as it may go, or a gain is named. Where a
     recorded torque drives the model, whose noise an inertia may follow, the datasheet may be right.
     """
-    best: Fit | CellFit
-    driven = False
-    if isinstance(found, Investigation):
-        if found.attribution is None or not found.diagnosis.steps:
-            return {}
-        named = bool(found.diagnosis.effects)
-        best = found.attribution.best if named else found.attribution.refit
-    else:
-        best = found.found.best
-        driven = not found.evidence.slow and None in found.evidence.player.loop.laws
+    if found.fitted is None:
+        return {}
+    evidence, best = found.fitted.evidence, found.fitted.found.best
+    driven = not evidence.slow and None in evidence.player.loop.laws
     ended = bool(at_limits(best.space, best.solution.x, best.model.plant))
     looks = {}
     if ended or _GAIN in found.diagnosis.effects:

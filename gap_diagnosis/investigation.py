@@ -1,39 +1,96 @@
-"""One diagnosis from bags to verdict, stage after stage."""
+"""One diagnosis: from recorded runs to causes and a remainder, stage after stage."""
 
 from __future__ import annotations
 
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
-from fjr_records.encoder_step import position_step
-from fjr_records.noise import NoiseLevels, even_lines_as_noise
-from fjr_records.periodic import RecordedExperiment
+from fjr_records.driven import wrong_sign
+from fjr_records.periodic import RecordedExperiment, RecordedRealization
+from fjr_records.records import Record, RecordSet
 
-from .gates.bags_gate import with_bags_gate
-from .gates.gate_checks import GateReport, check_gates
-from .judgement import judge, stopped
-from .model.misfit import Misfit
+from .coarse_encoder import with_coarse_encoder
+from .gates.bag_deviations import GROUPS
+from .gates.bags_gate import as_bags, drift_of_runs, run_changes, scattering
+from .how_far.ledger import Ledger
+from .how_far.steady_view import SteadyView
+from .judgement import judge
+from .kept_causes import kept
+from .model.evidence import Evidence
+from .model.quasi_static import NOTE as QUASI_STATIC
+from .model.quasi_static import Stations
+from .model.record_length import within
 from .model.rig_model import Model
-from .model.simulated_rig import Signals, Simulator
-from .outcome.diagnosis import Diagnosis
-from .outcome.verdict_words import ROUNDING
-from .where.residual_map import ResidualMap, residual_map
-from .where.residual_torque import ResidualTorque, residual_torque
-from .which.attribution import NOTHING_LEFT, Attribution
+from .model.steady_runs import SteadyRuns
+from .notes import at_limits
+from .outcome.diagnosis import Bags, Diagnosis
+from .outcome.verdict_words import OUT_OF_TIME, ROUNDING
+from .tested_causes import Tested
+from .torque_timing import Timing, timed
 from .which.catalogue import catalogue
-from .which.fits import Fitter
-from .which.rounding import coarse, in_the_loop, smooth, widened, with_rounding
-from .which.search import Search
+from .which.cell_fits import CellFitter
+from .which.comparison import NOTHING_LEFT, CellFit
+from .which.equivalents import founded, partners
+from .which.estimates import moved_by_scatter, relative_scatter
+from .which.found import Found
+from .which.gains import stands_for
+from .which.rounding import beside_rounding
 from .which.search_space import TOLERANCE
+from .which.stepwise import Stepwise
+from .which.unseen_friction import SCATTER
 
 Progress = Callable[[str], None]
 
-_ROUNDS = 3  # of simulating what rounding adds to the refit, and fitting it anew
+ASSUMED = (
+    "How far friction scatters from run to run cannot be seen in these runs; the intervals allow "
+    f"for {100 * SCATTER:.0f} %. Two runs more than levels that all move enough show it."
+)
+
+LOST = (
+    "The best explanation still misses more than the whole motion, so it predicts nothing and none "
+    "of its causes is named: check the datasheet, the factor of the torque, and whether the runs "
+    "are sampled fast enough for the rig."
+)
+
+_HOPELESS = 5.0
+"""Times the motion: where the refit misses more, nothing is searched, for no effect mends that."""
+_SHOWN = 3
+"""Most runs of which the same is said."""
+_SEARCH_SHARE = 0.6
+"""Of the budget for the search; the tests of what it found take about as long as one more step."""
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """What was fitted to the runs, and what the tests of presence say of it.
+
+    Attributes:
+        fitter: fits explanations to the runs.
+        found: the steps of the search.
+        tested: the causes with their tests.
+        tied: fits in which another effect does as well in place of one of the causes.
+    """
+
+    fitter: CellFitter
+    found: Found
+    tested: tuple[Tested, ...]
+    tied: tuple[CellFit, ...]
+
+    @property
+    def evidence(self) -> Evidence:
+        """The runs in windows, and what plays them."""
+        return self.fitter.evidence
+
+    @property
+    def models(self) -> dict[str, Model]:
+        """The model of each step by name: refit, then each cause that was added."""
+        refit, *causes = self.found.steps
+        return {"refit": refit.model, **{" + ".join(fit.effects): fit.model for fit in causes}}
 
 
 @dataclass(frozen=True)
@@ -41,178 +98,206 @@ class Investigation:
     """Everything that a diagnosis rests on.
 
     Attributes:
-        recorded: the experiment.
+        recorded: the experiment of steady periods, or the records.
         nominal: the nominal model.
-        gates: outcome of the gates.
-        noise: noise of the lines; None where only one period was kept.
-        held: indices of the held-out realizations.
-        signals: simulated by each model, by its name: nominal, refit, explained.
-        maps: residual maps of the same.
-        attribution: what the search found; None if the gates forbade it.
         diagnosis: the outcome.
+        fitted: what was fitted; None where a gate forbids it.
+        steady: what only steady periods show; None for records.
     """
 
-    recorded: RecordedExperiment
+    recorded: RecordedExperiment | RecordSet
     nominal: Model
-    gates: GateReport
-    noise: NoiseLevels | None
-    held: tuple[int, ...]
-    signals: Mapping[str, Signals]
-    maps: Mapping[str, ResidualMap]
-    attribution: Attribution | None
     diagnosis: Diagnosis
+    fitted: Fitted | None
+    steady: SteadyView | None = None
 
     @property
-    def held_size(self) -> int:
-        """Degrees of freedom of the held-out data, as `Misfit.size`."""
-        outputs = 2 if self.recorded.has_link else 1
-        return len(self.held) * (outputs * (2 * self.recorded.lines - 1) - (outputs - 1))
-
-    @cached_property
-    def residual_torques(self) -> Mapping[str, ResidualTorque]:
-        """Residual torque of the refit and, if it has an effect, of the best explanation."""
-        if self.attribution is None:
-            return {}
-        fits = {"refit": self.attribution.refit}
-        if self.attribution.best.effects:
-            fits["explained"] = self.attribution.best
-        return {k: residual_torque(self.recorded, f.model, self.noise) for k, f in fits.items()}
+    def runs(self) -> Sequence[RecordedRealization | Record]:
+        """All runs that were recorded."""
+        if isinstance(self.recorded, RecordedExperiment):
+            return self.recorded.realizations
+        return self.recorded.records
 
 
-def investigate(
-    recorded: RecordedExperiment,
-    nominal: Mapping[str, float],
-    *,
-    tolerance: float = TOLERANCE,
-    effects: Sequence[str] | None = None,
-    budget_s: float = math.inf,
-    progress: Progress = lambda _: None,
+@dataclass(frozen=True)
+class Order:
+    """What is asked of a diagnosis.
+
+    Attributes:
+        nominal: datasheet values by the names of PLANT.
+        tolerance: how far one may be off, relative.
+        effects: identifiers to look for; None for all.
+        budget_s: time for search and tests together, from here on; what is begun is ended.
+        progress: told what is done.
+        begun: when it was given (s, `time.monotonic`).
+    """
+
+    nominal: Mapping[str, float]
+    tolerance: float = TOLERANCE
+    effects: Sequence[str] | None = None
+    budget_s: float = math.inf
+    progress: Progress = lambda _: None
+    begun: float = field(default_factory=time.monotonic)
+
+    @property
+    def search_ends(self) -> float:
+        """When the search may begin nothing new (s, `time.monotonic`)."""
+        now = time.monotonic()
+        return now + _SEARCH_SHARE * max(self.begun + self.budget_s - now, 0.0)
+
+
+def investigate_runs(
+    records: RecordSet, order: Order, slow: Stations | None = None
 ) -> Investigation:
-    """Diagnose an experiment of steady periods and keep all the evidence.
+    """Diagnose the gap between recorded runs and the nominal simulation.
 
     Args:
-        recorded: the experiment, from `fjr_records.read_experiment`.
-        nominal: datasheet values of the bare plant's parameters in SI units, by the names of
-            `fjr_sim_node.plant.PLANT`; `read_nominal` reads them from a parameter file.
-        tolerance: how far a datasheet value may be off, relative.
-        effects: identifiers to look for; None for all.
-        budget_s: time after which no effect is added any more.
-        progress: told which stage begins.
+        records: from `read_records`, or `steady_runs` of an experiment.
+        order: what is asked.
+        slow: stations of the records, where they are to be compared by torque alone.
 
     Raises:
-        InputError: bags of different rigs, a controller of an unknown kind, or an effect of an
-            unknown name.
+        InputError: records too short for any window, a controller that is described badly, or an
+            effect of an unknown name.
     """
-    until = time.monotonic() + budget_s
-    model = Model.nominal(nominal)
-    catalogue(model.plant, effects)
-    progress("gates")
-    simulator = Simulator(recorded)
-    noise = simulator.noise(model)
-    gates = check_gates(recorded, model, noise)
-    train, held = _split(recorded)
-    held_out = not set(held) <= set(train)
-    if gates.hint == "bad_data":
-        diagnosis = stopped("bad_data", gates)
-        return Investigation(recorded, model, gates, noise, held, {}, {}, None, diagnosis)
-    std = _noise_std(recorded, noise)
-    simulator.begin_near(model, std, train)
-    step = position_step([r.position for r in recorded.realizations])
-    seen = std if step is None else widened(std, step, recorded.experiment.samples_per_period)
-
-    def fitted_by(simulator: Simulator, std: np.ndarray) -> Fitter:
-        return Fitter(recorded, simulator, std, model.plant, train, held, tolerance, effects)
-
-    fitter, bare = fitted_by(simulator, seen), simulator
-    if step is not None and simulator.repeats and coarse(recorded, step):
-        progress("rounding in the loop")
-        simulator, fitter = _rounding_in_the_loop(simulator, fitter, fitted_by, step, std)
-    attribution = Search(fitter, progress, until).run()
-    if step is not None and (effects is None or ROUNDING in effects):
-        plain = Misfit(recorded, bare, std, train), Misfit(recorded, bare, std, held)
-        attribution = with_rounding(attribution, plain, step)
-    progress("judgement")
-    gates = with_bags_gate(gates, recorded, noise, simulator, attribution.best.model)
-    best = attribution.best
-    named = ROUNDING in best.effects  # then only the explanation holds what rounding adds
-    rounded = simulator.signals(best.model) if named else None
-    without, alone = (
-        (bare, Misfit(recorded, bare, std, held)) if named else (simulator, fitter.held)
-    )
-    explained = smooth(best.model) if len(best.effects) > 1 else best.model
-    signals = {
-        "nominal": without.signals(model),
-        "refit": without.signals(attribution.refit.model),
-        "explained": simulator.signals(explained),
-    }
-    maps = {name: residual_map(recorded, noise, *simulated) for name, simulated in signals.items()}
-    diagnosis = judge(
-        recorded, std, gates, fitter, attribution, signals, maps, held_out=held_out,
-        known_noise=noise is not None, nominal_misfit=alone.chi2(model), rounded=rounded,
+    nominal, tolerance, progress, until = (
+        order.nominal, order.tolerance, order.progress, order.search_ends,
     )  # fmt: skip
-    return Investigation(recorded, model, gates, noise, held, signals, maps, attribution, diagnosis)
+    model = Model.nominal(nominal)
+    names = catalogue(model.plant, order.effects)
+    if slow is None:
+        records, cut = within(records)
+        progress("windows and noise")
+        timing = timed(records, nominal, tolerance, progress)
+        fitter, begun_with = beside_rounding(timing.fitter, Found([timing.refit]), progress)
+        timing = replace(timing, fitter=fitter, refit=begun_with.best)
+    else:
+        cut = []
+        progress("torque of the slow motion")
+        fitter = CellFitter(Evidence(records, nominal, slow), model.plant, tolerance)
+        timing = Timing(fitter, fitter.refit(), (QUASI_STATIC,))
+    if _misses(timing.fitter, timing.refit) > _HOPELESS:
+        names = []
+    found = _searched(timing, names, progress, until)
+    if (other := timing.other_if_better(found.best)) is not None:
+        timing = other
+        progress(f"search with a torque that is {'' if timing.held else 'not '}held")
+        found = _searched(timing, names, progress, until)
+    fitter = timing.fitter
+    if found.best.effects:
+        fitter, found = beside_rounding(fitter, found, progress)
+    evidence, heard = fitter.evidence, [*timing.notes]
+    progress("scatter from run to run")
+    bags, scatter, said = _run_scatter(fitter, found.best)
+    heard += said
+    found, tested = kept(fitter, found, scatter, progress, names, until)
+    if (tested or not names) and _misses(fitter, found.best) >= 1.0:
+        found, tested = replace(found, steps=found.steps[:1]), []
+        heard.append(LOST)
+    progress("what may stand in for a cause")
+    tied = {t.effect: _tied(fitter, found, t, names) for t in tested}
+    alternatives = {effect: [fit.effects[-1] for fit in fits] for effect, fits in tied.items()}
+    progress("judgement")
+    notes = [*records.notes, *cut, *heard, *_notes(evidence, found)]
+    diagnosis = judge(fitter, model, found, tested, alternatives, bags, scatter, notes)
+    if order.effects is None or ROUNDING in order.effects:
+        fitter, found, diagnosis = with_coarse_encoder(fitter, model, found, diagnosis)
+    rivals = tuple(fit for fits in tied.values() for fit in fits)
+    return Investigation(records, model, diagnosis, Fitted(fitter, found, tuple(tested), rivals))
 
 
-def _rounding_in_the_loop(
-    simulator: Simulator,
-    fitter: Fitter,
-    fitted_by: Callable[[Simulator, np.ndarray], Fitter],
-    step: float,
-    std: np.ndarray,
-) -> tuple[Simulator, Fitter]:
-    """Return what simulates and fits a motion of few counts, if that comes nearer to the record.
+def _searched(timing: Timing, names: Sequence[str], progress: Progress, until: float) -> Found:
+    misses = partial(_misses, timing.fitter, parts=timing.fitter.select_parts)
+    return Stepwise(timing.fitter, names, progress, until, misses).run(timing.refit)
 
-    What rounding adds is simulated with the refit, which is fitted anew beside it.
 
-    Args:
-        simulator: of models whose encoder does not round.
-        fitter: for which rounding is white noise.
-        fitted_by: makes a fitter that simulates by one, with such noise of the lines.
-        step: of the encoder, rad.
-        std: noise of the lines, see `NoiseLevels.of_outputs`.
+def _misses(fitter: CellFitter, fit: CellFit, parts: Sequence[int] | None = None) -> float:
+    """Return which share of the motion a fit misses on some parts, by default those that report."""
+    return float(np.sqrt(np.mean(Ledger(fitter.evidence, parts).squares(fit.model))))
+
+
+def _run_scatter(
+    fitter: CellFitter, best: CellFit
+) -> tuple[Bags | None, dict[str, float], list[str]]:
+    """Return how far parameters scatter from run to run, seen or assumed, and sentences on it."""
+    changes = run_changes(fitter.evidence, best.variance, best.model)
+    if changes is None and fitter.misfit(best) < NOTHING_LEFT:
+        return None, {}, []  # what scatters would be left on runs that no fit has seen
+    if changes is None:
+        scatter = dict.fromkeys(GROUPS["friction"], SCATTER)
+        if not moved_by_scatter(best, fitter.runs, scatter).any():
+            return None, {}, []
+        return None, scatter, [ASSUMED]
+    bags, seen = as_bags(changes, fitter.evidence), scattering(changes)
+    said = [f"What scatters from run to run: {seen}."] if seen else []
+    drift = "" if isinstance(fitter.evidence.records, SteadyRuns) else drift_of_runs(bags)
+    return bags, relative_scatter(bags), [*said, *([drift] if drift else [])]
+
+
+def _tied(fitter: CellFitter, found: Found, tested: Tested, names: Sequence[str]) -> list[CellFit]:
+    """Return fits in which an effect does as well in place of a cause, all else fitted anew.
+
+    A near equivalent is in the set unless unseen parts tell it from the cause as surely as they
+    must show a cause at all.
     """
-    refit = fitter.refit()
-    least, chosen = refit.held_chi2, (simulator, fitter)
-    for _ in range(_ROUNDS):
-        if least < NOTHING_LEFT * fitter.held.size:
-            break
-        rounded = in_the_loop(simulator, refit.model, step, std.shape)
-        other = simulator.adding(rounded.added)
-        fitter = fitted_by(other, np.hypot(std, rounded.std))
-        refit = fitter.refit()
-        if not refit.held_chi2 < least:
-            break
-        least, chosen = refit.held_chi2, (other, fitter)
-    return chosen
+    best = found.best
+    near = {*partners([tested.effect], set(names))}
+    others = sorted({*near, *found.alternatives.get(tested.effect, ())} - set(best.effects))
+    tied, beside = [], tested.without.effects
+    searched = {fit.effects: fit for fits in found.rivals.values() for fit in fits}
+    for effect in founded(others, beside, fitter.nominal, names):
+        other = searched.get((*beside, effect))
+        if other is None:
+            proposals = fitter.screening(tested.without, effect).proposals()
+            other = fitter.add(tested.without, effect, proposals) if proposals else None
+        if other is None:
+            continue
+        as_well = partial(
+            stands_for, fitter, best=best, first=tested.gain.mean, near=effect in near
+        )
+        further = other
+        if as_well(other) or as_well(further := fitter.further(other)):
+            tied.append(further)
+    return tied
 
 
-def _split(recorded: RecordedExperiment) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Return `split` of the realizations."""
-    runs = recorded.realizations
-    return split([r.level for r in runs], [float(np.abs(r.torque).max()) for r in runs])
+def _notes(evidence: Evidence, found: Found) -> list[str]:
+    if evidence.slow:
+        return _notes_of_fit(found)
+    notes = list(evidence.simulator.loop.notes)
+    if not evidence.simulator.loop.commanded:  # a controller that makes the torque has its sign
+        doubted = [(r.name, wrong_sign(r.torque, r.position)) for r in evidence.records.records]
+        notes += [f"{name}: {doubt}." for name, doubt in doubted if doubt is not None][:_SHOWN]
+    step = evidence.noise.step_rad
+    if step is not None and evidence.noise.std_rad <= 1.01 * step / math.sqrt(12.0):
+        notes.append(
+            f"The encoder counts in steps of {step:.3g} rad; what it rounds away counts as noise."
+        )
+    if not evidence.noise.known:
+        notes.append(
+            "The noise of the position is not known: no repeats, no standstill, and the highest "
+            "lines are not flat; so nothing is said of significance."
+        )
+    laws = evidence.simulator.loop.laws
+    if None in laws:
+        where = "" if not any(laws) else f" for {laws.count(None)} of {len(laws)} runs"
+        notes.append(
+            f"The loop is not known{where}, so there the recorded torque drives the model and an "
+            f"observer of {evidence.simulator.crossover_hz:.3g} Hz holds it to the recorded "
+            "position: below that, errors show smaller than they are, and the figures of the "
+            "torque are those of what the observer adds."
+        )
+    return [*notes, *_notes_of_fit(found)]
 
 
-def split(
-    levels: Sequence[int], greatest_torques: Sequence[float]
-) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Return training and held-out realizations: in turn at each level; all, if a level has one.
-
-    At each level the one with the greatest torque is for training, so that a limit that it reaches
-    is known to the fit before others are predicted.
-
-    Args:
-        levels: level of each realization.
-        greatest_torques: greatest |u| of each.
-    """
-    train, held = [], []
-    for level in sorted(set(levels)):
-        members = [i for i, mine in enumerate(levels) if mine == level]
-        members.sort(key=lambda i: -greatest_torques[i])
-        train += members[0::2]
-        held += members[1::2]
-    return tuple(sorted(train)), tuple(sorted(held or train))
-
-
-def _noise_std(recorded: RecordedExperiment, noise: NoiseLevels | None) -> np.ndarray:
-    """Return `NoiseLevels.of_outputs`, or an upper bound if no noise is known."""
-    return (noise or even_lines_as_noise(recorded)).of_outputs(recorded)
+def _notes_of_fit(found: Found) -> list[str]:
+    best = found.best
+    notes = [*found.notes, *at_limits(best.space, best.solution.x, best.model.plant)]
+    if best.effects and not best.solution.converged:
+        notes.append(
+            f"The fit of {' + '.join(best.effects)} has not converged: the sizes, and their "
+            "intervals, are those of where it was ended."
+        )
+    if not found.complete:
+        notes.append(OUT_OF_TIME)
+    return notes

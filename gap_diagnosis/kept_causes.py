@@ -2,28 +2,44 @@
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
+from fjr_sim_node import effects as fx
+
+from .judgement import FEWEST_PARTS
 from .outcome.verdict_words import explanation
-from .record_judgement import FEWEST_PARTS
 from .tested_causes import Tested, causes_with_tests
-from .which.cell_fits import CellFit, CellFitter
+from .which.cell_fits import CellFitter
+from .which.comparison import CellFit
+from .which.equivalents import founded, partners
 from .which.found import Found
+from .which.gains import gain, stands_for
 
 Progress = Callable[[str], None]
 
 _MAY_BE_UNSURE = 2
 SURE = 0.8
 """How surely a cause beyond the two that gain most must be present."""
+_RIVALS = 3  # that did best when a cause was chosen, one of which may take its place
 _MUCH = 0.5
 """Share of the gap that a cause closes, from which on it is said why it is not named."""
 
 
 def kept(
-    fitter: CellFitter, found: Found, scatter: Mapping[str, float], progress: Progress
+    fitter: CellFitter,
+    found: Found,
+    scatter: Mapping[str, float],
+    progress: Progress,
+    names: Sequence[str],
+    until: float = math.inf,
 ) -> tuple[Found, list[Tested]]:
     """Take out, one at a time, the causes that do not pass the tests beside the others.
+
+    Another effect may do the same in its place: what it is a part of or nearly equivalent to, or
+    what did nearly as well when it was chosen, before other causes were there.
 
     A cause whose size alone is not certain may be blurred by another one: then that goes which
     gains least of all. Of those that pass, what is not sure goes as well, but for the two that gain
@@ -34,6 +50,8 @@ def kept(
         found: what the search found.
         scatter: of parameters from run to run, see `moved_by_scatter`.
         progress: told what is tested.
+        names: identifiers of what may be named.
+        until: when nothing is tried in place of a cause any more (s, `time.monotonic`).
 
     Returns:
         the steps that are left, and the tests of their causes.
@@ -43,6 +61,7 @@ def kept(
     steps, tested, notes = list(found.steps), [], list(found.notes)
     if not steps[-1].solution.converged:
         steps[-1] = fitter.further(steps[-1])
+    replaced: set[str] = set()
     while steps[-1].effects:
         progress(f"tests of {' + '.join(steps[-1].effects)}")
         tested = causes_with_tests(fitter, steps[-1], steps[0], scatter)
@@ -52,6 +71,14 @@ def kept(
         blurred = any(t.passes_beside_size and not t.certain for t in failed)
         weakest = min(tested if blurred else failed, key=lambda t: t.gain.mean)
         before = [fit for fit in steps if weakest.effect not in fit.effects]
+        in_time = time.monotonic() < until
+        if in_time and weakest.effect not in replaced and len(steps[-1].effects) > 1:
+            replaced.add(weakest.effect)
+            other = _in_its_place(fitter, found, steps[-1], weakest, names)
+            if other is not None:
+                replaced.add(other.effects[-1])
+                steps, tested = [*before, other], []
+                continue
         notes += [*_changing(weakest), *_kin(weakest)]
         last = weakest.without
         same = last.effects == before[-1].effects
@@ -64,6 +91,32 @@ def kept(
     if tested and any(len(fit.effects) != count for count, fit in enumerate(steps)):
         steps = [steps[0], *_one_by_one(fitter, steps[-1], tested)]
     return replace(found, steps=steps, notes=tuple(notes)), tested
+
+
+def _in_its_place(
+    fitter: CellFitter, found: Found, best: CellFit, tested: Tested, names: Sequence[str]
+) -> CellFit | None:
+    """Return the best fit with another effect in the place of one; None if none does as well."""
+    effect, without = tested.effect, tested.without
+    chosen = [
+        (gain(fitter, fit, found.steps[0]).mean, fit.effects[-1])
+        for fits in found.rivals.values()
+        for fit in fits
+        if fit.effects[:-1] == best.effects[: best.effects.index(effect)]
+    ]
+    near = [*partners([effect], set(names)), fx.EFFECTS[effect].modifies]
+    near += [name for _, name in sorted(chosen, reverse=True)[:_RIVALS]]
+    others = [e for e in dict.fromkeys(near) if e in names and e not in best.effects]
+    fits = []
+    for other in founded(others, without.effects, fitter.nominal, names):
+        proposals = fitter.screening(without, other).proposals()
+        fit = fitter.add(without, other, proposals) if proposals else None
+        if fit is not None and gain(fitter, fit, without).present:
+            fits.append(fitter.further(fit))
+    if not fits:
+        return None
+    most = max(fits, key=lambda fit: gain(fitter, fit, without).mean)
+    return most if stands_for(fitter, most, best, tested.gain.mean) else None
 
 
 def _changing(tested: Tested) -> list[str]:

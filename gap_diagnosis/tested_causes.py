@@ -8,9 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .how_far.record_ledger import Ledger
+from .how_far.ledger import Ledger
 from .outcome.diagnosis import Figure
-from .which.cell_fits import CellFit, CellFitter
+from .which.cell_fits import CellFitter
+from .which.comparison import CellFit
 from .which.gains import Gain, closed, fall, gain
 from .which.presence import (
     LEAST_INVARIANCE_P,

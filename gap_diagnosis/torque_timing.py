@@ -14,7 +14,8 @@ from fjr_records.records import RecordSet
 from .model.evidence import Evidence
 from .model.record_torque import CONTINUOUS, with_continuous_torque
 from .model.rig_model import Model
-from .which.cell_fits import CellFit, CellFitter
+from .which.cell_fits import CellFitter
+from .which.comparison import CellFit
 from .which.gains import gain, stands_for
 
 Progress = Callable[[str], None]
@@ -62,7 +63,7 @@ class Timing:
         (effect,) = late[:1]
         worth = gain(self.fitter, best, self.fitter.without(best, effect)).mean
         held = other.fitter.without(best, effect)
-        return other if stands_for(gain(self.fitter, best, held), worth) else None
+        return other if stands_for(self.fitter, held, best, worth) else None
 
 
 def _half(model: Model, effect: str, rate: float) -> bool:

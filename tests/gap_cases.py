@@ -12,13 +12,18 @@ import numpy as np
 from controller_node import pd_filtered
 from excitation_node import multisine
 from fjr_interface.bags.writer import BagWriter
-from fjr_records.noise import noise_levels
 from fjr_records.periodic import RecordedExperiment, RecordedRealization
 from fjr_sim_node.plant import PLANT
 from fjr_sim_node.simulation.simulator import SIMULATOR, run_realization
+from gap_diagnosis.any_record import investigate
+from gap_diagnosis.gates.bag_changes import BagChanges
+from gap_diagnosis.gates.bags_gate import run_changes
+from gap_diagnosis.investigation import Fitted
+from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.model.rig_model import Model
-from gap_diagnosis.model.simulated_rig import Simulator
-from gap_diagnosis.which.fits import Fitter
+from gap_diagnosis.model.steady_runs import steady_runs
+from gap_diagnosis.outcome.diagnosis import Diagnosis
+from gap_diagnosis.which.cell_fits import CellFitter
 from gap_diagnosis.which.search_space import TOLERANCE
 
 LEVELS_RAD = (2e-3, 7e-3, 2e-2)
@@ -162,11 +167,30 @@ def write_bags(case: Case, folder: Path) -> Path:
 
 
 def fitter_of(
-    case: Case, tolerance: float = TOLERANCE
-) -> tuple[RecordedExperiment, Simulator, Fitter]:
-    """Return what fits a case of two levels of two realizations from the paper's values."""
-    recorded, simulator = case.recorded, Simulator(case.recorded)
-    noise = noise_levels(recorded).of_outputs(recorded)
-    nominal = Model.nominal(PLANT.defaults()).plant
-    fitter = Fitter(recorded, simulator, noise, nominal, (0, 2), (1, 3), tolerance)
-    return recorded, simulator, fitter
+    recorded: RecordedExperiment,
+    nominal: Mapping[str, float] | None = None,
+    tolerance: float = TOLERANCE,
+) -> CellFitter:
+    """Return what fits an experiment of steady periods, by default from the paper's values."""
+    values = PLANT.defaults() if nominal is None else nominal
+    bare = Model.nominal(values).plant
+    return CellFitter(Evidence(steady_runs(recorded), values), bare, tolerance)
+
+
+def found_in(
+    recorded: RecordedExperiment,
+    nominal: Mapping[str, float],
+    *effects: str,
+    tolerance: float = TOLERANCE,
+) -> tuple[Diagnosis, Fitted]:
+    """Diagnose an experiment by a few effects; return the outcome and what was fitted."""
+    found = investigate(recorded, nominal, effects=effects or None, tolerance=tolerance)
+    assert found.fitted is not None
+    return found.diagnosis, found.fitted
+
+
+def changes_of(recorded: RecordedExperiment, model: Model) -> tuple[BagChanges | None, Evidence]:
+    """Return what changes from bag to bag beside a model that leaves noise alone."""
+    evidence = Evidence(steady_runs(recorded), model.whole_plant)
+    variance = evidence.floor(range(len(evidence.parts)))
+    return run_changes(evidence, variance, model), evidence

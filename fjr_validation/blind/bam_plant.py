@@ -23,7 +23,7 @@ import numpy as np
 
 from controller_node import transfer_function
 from fjr_kit.compiled import inlined, jit
-from gap_diagnosis.model.record_rig import Drive
+from gap_diagnosis.model.drive import Drive
 
 FRICTION = (
     "base", "viscous", "stribeck", "stribeck_speed", "alpha", "load_motor", "load_external",

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from controller_node import transfer_function
-from gap_diagnosis.model.record_rig import Drive
+from gap_diagnosis.model.drive import Drive
 from gap_diagnosis.outcome.diagnosis import Diagnosis
 
 from .baseline_fit import MATTERS, Positions, Problem, verdict_of

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Protocol
 
 import numpy as np
 
@@ -13,8 +12,8 @@ from fjr_kit.showing import BareRefit
 from fjr_sim_node.plant import PLANT
 
 from ..model.rig_model import Model
-from ..which.scales import Scales
 from .foreseen import ForeseenParameter, Known
+from .sight import Sight
 
 _STEP = 1e-3
 _TIED = 0.3  # of the greatest share that a parameter has in the combination that is known worst
@@ -22,32 +21,6 @@ _NOTHING = 1e-9  # of the greatest information: less is rounding
 _DIVERGED = 1e5
 _FAR = 0.03  # relative change of a parameter from which slopes are taken anew
 _RENEWED = 3  # times at the most
-
-
-class Sight(Protocol):
-    """What an experiment shows: of `periodic_sight` or `record_sight`."""
-
-    scales: Scales
-    noise_known: bool
-
-    @property
-    def levels(self) -> tuple[str, ...]:
-        """Names of the levels."""
-
-    def errors(self, models: Sequence[Model]) -> np.ndarray:
-        """Return errors of models over their standard deviation, float64 (models, errors)."""
-
-    def too_stiff(self, model: Model) -> bool:
-        """Tell whether a model would take too long to play."""
-
-    def strength(self, change: np.ndarray) -> float:
-        """Return how far a change shows, over what the diagnosis needs to name an effect."""
-
-    def best_level(self, change: np.ndarray) -> int:
-        """Return the index of the level at which a change shows best."""
-
-    def fit_weights(self, errors: int) -> np.ndarray:
-        """Return how often each error counts in the diagnosis's fits, (errors,)."""
 
 
 def bare_refit(sight: Sight, nominal: Model) -> BareRefit:

@@ -19,11 +19,11 @@ from fjr_sim_node import effects as fx
 
 from ..model.rig_model import Model
 from ..outcome.verdict_words import ROUNDING
-from ..which.equivalents import SCALES
 from ..which.screening import by_shape
 from ..which.search_space import beside, starts
-from .bare_parameters import Sight, left_by_refit
+from .bare_parameters import left_by_refit
 from .foreseen import ForeseenEffect
+from .sight import Sight
 
 _MOST = 20.0  # times what the slope of a shape promises
 _LOOSE, _TIGHT = 5.0, 0.02  # limits of a drive that are tried, times the greatest torque
@@ -292,7 +292,7 @@ def _beforehand(effect: str) -> str:
         return _SEEN_DIRECTLY
     if not entry.starts:
         return _ONLY_A_GATE
-    if entry.scales and entry.same_as and effect in SCALES:
+    if entry.scales and entry.same_as:
         return f"It is exactly {entry.same_as}."
     return ""
 

@@ -11,14 +11,14 @@ from fjr_sim_node import effects as fx
 from ..gates.gate_checks import check_gates
 from ..model.nominal import refuse_too_stiff
 from ..model.rig_model import Model
+from ..model.steady_runs import steady_runs
 from ..which.catalogue import catalogue
 from ..which.scales import Scales
 from ..which.search_space import TOLERANCE
-from .bare_parameters import Sight, bare_refit, parameters
+from .bare_parameters import bare_refit, parameters
 from .effect_limits import EffectLimits
 from .foreseen import ForeseenEffect, Foresight
-from .periodic_sight import PeriodicSight
-from .record_sight import RecordSight
+from .sight import Sight
 
 Progress = Callable[[int, int, str], None]
 """Called with (done, all, what is being looked at)."""
@@ -68,11 +68,13 @@ def foresee(
     names = catalogue(bare.plant, effects)
     if effects is None or "nonstationary" in effects:
         names = [*names, "nonstationary"]
-    sight: Sight
+    runs: RecordSet
     if isinstance(recorded, RecordedExperiment):
-        kind, sight = "periodic", PeriodicSight(recorded, bare, realizations)
+        levels = [f"{1e3 * amplitude:.3g} mrad" for amplitude in recorded.amplitudes_rad]
+        kind, runs = "periodic", steady_runs(recorded)
     else:
-        kind, sight = "records", RecordSight(recorded, bare, realizations)
+        kind, runs, levels = "records", recorded, [f"level {level}" for level in recorded.levels]
+    sight = Sight(runs, bare, levels, realizations)
     refit = bare_refit(sight, bare)
     limits = EffectLimits(sight, bare, refit, showing)
     found = []
@@ -89,7 +91,7 @@ def foresee(
     return Foresight(
         source=recorded.source,
         kind=kind,
-        levels=list(sight.levels),
+        levels=levels,
         tolerance=tolerance,
         parameters=parameters(sight, refit, tolerance),
         effects=sorted(told, key=lambda one: _rank(one, sight.scales)),

@@ -11,14 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fjr_records.noise import NoiseLevels
-from fjr_records.periodic import RecordedExperiment
-from fjr_records.spectra import line_spectrum
 from fjr_sim_node import effects as fx
 
 from ..model.evidence import Evidence
 from ..model.rig_model import Model
-from ..model.simulated_rig import Simulator
 
 BagErrors = Callable[[Sequence[Model], int], np.ndarray]
 """Takes models and the index of a bag, returns their errors in it, float64 (models, errors), in
@@ -71,27 +67,11 @@ class Deviations:
         return columns
 
 
-def periodic_errors(
-    recorded: RecordedExperiment, noise: NoiseLevels, simulator: Simulator
-) -> BagErrors:
-    """Return the errors of steady periods, line by line, in standard deviations of the noise."""
-
-    def errors(models: Sequence[Model], index: int) -> np.ndarray:
-        r = recorded.realizations[index]
-        std = noise.position[noise.row(r.level)]
-        scale = np.concatenate([[1.0], np.full(std.size - 1, np.sqrt(2.0))]) / std
-        measured = r.spectrum(r.position, recorded.lines).mean(0)
-        lines = line_spectrum(simulator.many(models, [index])[:, 0, 0], scale.size)
-        return _parts((lines - measured) * scale)
-
-    return errors
-
-
-def record_errors(evidence: Evidence, variance: np.ndarray) -> tuple[BagErrors, BagBlocks]:
-    """Return the errors of records in standard deviations of each cell, and their blocks.
+def run_errors(evidence: Evidence, variance: np.ndarray) -> tuple[BagErrors, BagBlocks]:
+    """Return the errors of runs in standard deviations of each cell, and their blocks.
 
     Args:
-        evidence: the records.
+        evidence: the runs.
         variance: (cells,), of an error in each cell, rad2.
     """
     parts = {

@@ -5,64 +5,44 @@ from __future__ import annotations
 import numpy as np
 from scipy.stats import norm
 
-from fjr_records.noise import NoiseLevels
 from fjr_records.periodic import RecordedExperiment
 
 from ..model.evidence import Evidence
 from ..model.rig_model import Model
-from ..model.simulated_rig import Simulator
+from ..model.steady_runs import SteadyRuns
 from ..outcome.diagnosis import Bags, BagTrend, Estimate
-from .bag_changes import TREND_FALSE_ALARM, BagChanges, Trend, bag_changes
-from .bag_deviations import periodic_errors, record_errors
-from .gate_checks import Gate, GateReport, untested
+from .bag_changes import TREND_FALSE_ALARM, BagChanges, bag_changes
+from .bag_deviations import run_errors
+from .gate_checks import Gate, untested
 
 SCATTER_SHOWN = 1e-3
 """Least relative scatter from bag to bag that a sentence mentions."""
 
 
-def with_bags_gate(
-    report: GateReport,
-    recorded: RecordedExperiment,
-    noise: NoiseLevels | None,
-    simulator: Simulator,
-    model: Model,
-) -> GateReport:
-    """Return the gates with `bags_gate` as the last one, and all that a reader must see."""
-    bags = bags_gate(recorded, noise, simulator, model)
-    telling = [bags.sentence] if bags.telling else []
-    return GateReport((*report.gates, bags), (*report.notes, *recorded.notes, *telling))
+def bags_gate(bags: Bags | None, recorded: RecordedExperiment) -> Gate:
+    """Tell whether friction or stiffness drift from bag to bag of steady periods.
 
+    Scatter without a trend is no drift: it passes.
 
-def bags_gate(
-    recorded: RecordedExperiment,
-    noise: NoiseLevels | None,
-    simulator: Simulator,
-    model: Model,
-) -> Gate:
-    """Test whether friction or stiffness drift from bag to bag, with a refit or explained model.
-
-    Scatter without a trend is no drift: it passes, and the sentence and `Gate.bags` tell its size.
+    Args:
+        bags: what changes beside the best model; None where that could not be tested.
+        recorded: the experiment.
     """
     name = "stationary over realizations"
-    needs = (
-        "two bags more than levels, two periods each, and motion that determines friction and "
-        "stiffness in each bag"
-    )
-    changes = periodic_changes(recorded, noise, simulator, model) if noise is not None else None
-    if changes is None:
-        return untested(name, needs)
-    worst = worst_trend(changes)
-    span_s = float(np.ptp([r.experiment.elapsed_s for r in recorded.realizations]))
-    passed = worst.p_value > TREND_FALSE_ALARM
-    scatter = scattering(changes)
-    if passed:
-        sentence = "neither friction nor stiffness follows a trend from bag to bag"
-        sentence += f"; without one, {scatter} scatters." if scatter else "."
-    else:
-        sentence = (
-            f"{worst.group} follows a trend from bag to bag {_along(worst, span_s)} over the "
-            "record; let the rig warm up, or record levels interleaved."
+    if bags is None:
+        return untested(
+            name,
+            "two bags more than levels, two periods each, and motion that determines friction and "
+            "stiffness in each bag",
         )
+    group, worst = worst_trend(bags)
+    passed = worst.p_value > TREND_FALSE_ALARM
+    sentence = (
+        "neither friction nor stiffness follows a trend from bag to bag."
+        if passed
+        else f"{group} follows a trend from bag to bag {_along(worst)} over the record; let the "
+        "rig warm up, or record levels interleaved."
+    )
     z, limit = (float(norm.isf(0.5 * max(p, 1e-300))) for p in (worst.p_value, TREND_FALSE_ALARM))
     return Gate(
         name=name,
@@ -71,67 +51,62 @@ def bags_gate(
         limit=limit,
         sentence=sentence,
         hint="nonstationary",
-        bags=as_bags(changes, span_s),
-        telling=passed and bool(scatter),
     )
 
 
-def periodic_changes(
-    recorded: RecordedExperiment, noise: NoiseLevels, simulator: Simulator, model: Model
-) -> BagChanges | None:
-    """Return what changes from bag to bag of steady periods; see `bag_changes`."""
-    levels = np.array([r.level for r in recorded.realizations])
-    elapsed_s = np.array([r.experiment.elapsed_s for r in recorded.realizations])
-    return bag_changes(periodic_errors(recorded, noise, simulator), levels, elapsed_s, model)
+def run_changes(evidence: Evidence, variance: np.ndarray, model: Model) -> BagChanges | None:
+    """Return how parameters scatter and drift from run to run; see `bag_changes`.
 
-
-def record_changes(evidence: Evidence, variance: np.ndarray, model: Model) -> BagChanges | None:
-    """Return how parameters scatter and drift from record to record; see `bag_changes`.
-
-    A trend is one over the order of the records, since nothing tells when they began.
+    A trend of records is one over their order, since nothing tells when they began.
 
     Args:
-        evidence: the records.
+        evidence: the runs.
         variance: (cells,), of an error in each cell, rad2.
         model: the best model.
     """
     levels = np.array([r.level for r in evidence.records.records])
-    errors, blocks = record_errors(evidence, variance)
-    return bag_changes(errors, levels, np.arange(levels.size, dtype=float), model, blocks)
+    errors, blocks = run_errors(evidence, variance)
+    return bag_changes(errors, levels, _times(evidence), model, blocks)
 
 
-def worst_trend(changes: BagChanges) -> Trend:
-    """Return the trend that chance makes least often."""
-    return min(changes.trends, key=lambda trend: trend.p_value)
+def _times(evidence: Evidence) -> np.ndarray:
+    """Return when runs began, (runs,): s, or their order where nothing tells."""
+    runs = evidence.records.records
+    if isinstance(evidence.records, SteadyRuns):
+        return np.array([r.elapsed_s for r in runs])
+    return np.arange(len(runs), dtype=float)
 
 
-def drift_of_runs(changes: BagChanges, runs: int) -> str:
-    """Return the sentence on a trend over runs in the order of their files; empty without one."""
-    worst = worst_trend(changes)
+def worst_trend(bags: Bags) -> tuple[str, BagTrend]:
+    """Return the group whose trend chance makes least often, and that trend."""
+    return min(bags.trends.items(), key=lambda item: item[1].p_value)
+
+
+def drift_of_runs(bags: Bags) -> str:
+    """Return the sentence on a trend over records in the order of their files; empty without."""
+    group, worst = worst_trend(bags)
     if worst.p_value > TREND_FALSE_ALARM:
         return ""
     return (
-        f"In the order of the runs {worst.group} follows a trend {_along(worst, runs - 1.0)} from "
-        "the first to the last: if they were recorded in this order, let the rig warm up, or "
-        "record levels interleaved."
+        f"In the order of the runs {group} follows a trend {_along(worst)} from the first to the "
+        "last: if they were recorded in this order, let the rig warm up, or record levels "
+        "interleaved."
     )
 
 
-def _along(trend: Trend, span: float) -> str:
+def _along(trend: BagTrend) -> str:
     return (
         f"(by chance in {trend.p_value:.1g} of rigs that only scatter), along a line by "
-        f"{trend.slope_per_s * span:+.2%}"
+        f"{trend.change_percent:+.2f}%"
     )
 
 
-def as_bags(changes: BagChanges, span_s: float) -> Bags:
-    """Return changes as the outcome holds them; `span_s` is from the first bag to the last.
-
-    Of records, whose order alone is known, it is their number less one.
-    """
+def as_bags(changes: BagChanges, evidence: Evidence) -> Bags:
+    """Return changes as the outcome holds them, trends from the first run to the last."""
+    span = float(np.ptp(_times(evidence)))
     return Bags(
         trends={
-            t.group: BagTrend(change_percent=100.0 * t.slope_per_s * span_s, p_value=t.p_value)
+            t.group: BagTrend(change_percent=100.0 * t.slope_per_s * span, p_value=t.p_value)
             for t in changes.trends
         },
         scatter_percent={

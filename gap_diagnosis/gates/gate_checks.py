@@ -19,7 +19,6 @@ from fjr_records.spectra import PeriodSums
 from ..model.controller_check import check_controller
 from ..model.discretisation import discretisation_error
 from ..model.rig_model import Model
-from ..outcome.diagnosis import Bags
 from .data_notes import data_notes
 from .stationarity import PERIOD_Z_LIMIT, period_drift
 
@@ -39,14 +38,10 @@ class Gate(Check):
 
     Attributes:
         hint: the verdict that a failure suggests.
-        bags: what changes from bag to bag, where this gate compares bags.
-        telling: whether a reader must see the sentence although the gate passed.
         of_periods: whether it asks for periods that repeat, which records need not do.
     """
 
     hint: Hint = "bad_data"
-    bags: Bags | None = None
-    telling: bool = False
     of_periods: bool = False
 
 

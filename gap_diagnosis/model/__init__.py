@@ -1,9 +1,9 @@
 """The simulated rig with free parameters, and its error against what was recorded.
 
-`rig_model.Model` is a bare plant with effects. Steady periods: `simulated_rig.Simulator`
-repeats the loop and `misfit` weighs the errors of its lines. Records: `record_rig` plays each run
-from its true start, in the loop that `record_loop` finds (gains by `controller_gains`) or held by
-the observer of `prediction`, with a torque as `record_torque` takes it; `evidence` cuts the errors
-into windows (`lapped`), cells and parts. `nominal` reads datasheets, `controller_check` compares
-torque and law, `discretisation` measures the simulation's own error.
+`rig_model.Model` is a bare plant with effects. `record_rig` plays each run from where it begins
+(`record_start`) by its `drive`: the loop that `record_loop` finds (gains by `controller_gains`) or
+the observer of `prediction`, with a torque as `record_torque` takes it. Steady periods are runs of
+one mean period (`steady_runs`); `simulated_rig.Simulator` repeats all their periods for the BLA.
+`evidence` cuts the errors into windows (`lapped`), cells and parts. `nominal` reads datasheets,
+`controller_check` compares torque and law, `discretisation` measures the simulation's own error.
 """

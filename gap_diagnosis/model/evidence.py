@@ -8,6 +8,7 @@ record: some parts are for fitting, others for selecting, others for reporting.
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Mapping, Sequence
 from functools import cached_property
@@ -23,6 +24,7 @@ from .parts import Purpose, cut
 from .quasi_static import QuasiStaticSimulator, Stations
 from .record_rig import RecordSimulator
 from .rig_model import Model
+from .steady_runs import SteadyRuns
 
 WINDOWS = 24
 """Windows into which the shortest record is cut, at least; twice as many where a level has a single
@@ -62,7 +64,8 @@ class Evidence:
         self.slow = slow is not None
         self.records = records = records if slow is None else slow.records
         rate = records.sample_rate_hz
-        shortest = min(r.samples for r in records.records)
+        run_in = records.run_in if isinstance(records, SteadyRuns) else 0
+        shortest = min(r.samples for r in records.records) - run_in
         levels = [r.level for r in records.records]
         alone = any(levels.count(level) == 1 for level in levels)
         windows = 2 * WINDOWS if alone else WINDOWS
@@ -77,7 +80,8 @@ class Evidence:
             self.noise, self.lines = RecordNoise("none", math.nan), self.hop
             self.simulator = QuasiStaticSimulator(slow)
         else:
-            self.noise = record_noise(records)
+            known = records.noise if isinstance(records, SteadyRuns) else None
+            self.noise = known or record_noise(records)
             self.lines = self._lines_with_signal()
             top_hz = self.lines * self.line_hz
             self.simulator = RecordSimulator(records, self.noise, top_hz, nominal)
@@ -88,7 +92,7 @@ class Evidence:
             / np.maximum(np.abs(self.simulator.response(frequency, i)), 1e-300)
             for i, r in enumerate(records.records)
         ]
-        self.parts = tuple(cut(records, self.hop))
+        self.parts = tuple(cut(records, self.hop, run_in))
         self._band = np.searchsorted(self.edges, np.arange(self.lines), side="right") - 1
 
     def _lines_with_signal(self) -> int:
@@ -112,6 +116,12 @@ class Evidence:
         return 0.5 * self.records.sample_rate_hz / self.hop
 
     @property
+    def band_hz(self) -> float:
+        """Highest frequency that is excited, where that is known; lines above hold harmonics."""
+        top_hz = self.lines * self.line_hz
+        return min(top_hz, self.records.top_hz) if isinstance(self.records, SteadyRuns) else top_hz
+
+    @property
     def bands(self) -> int:
         """Number of bands."""
         return len(self.edges) - 1
@@ -126,15 +136,42 @@ class Evidence:
         """Variance of the noise of an error in each cell, (cells,), rad2; 0 where not known."""
         if not self.noise.known:
             return np.zeros(self.cells)
+        if isinstance(self.records, SteadyRuns) and not self.noise.rounds:
+            seen = self._scattered(self.records.scatter)
+            if seen is not None:
+                return np.tile(seen, len(self.records.levels))
         cycles = 0.5 * (np.arange(self.lines) + 0.5) / self.hop
         of_band = np.add.reduceat(self.noise.power(cycles), self.edges[:-1]) / np.diff(self.edges)
         return np.tile(of_band, len(self.records.levels))
+
+    def _scattered(self, scatter: Sequence[np.ndarray]) -> np.ndarray | None:
+        """Return the variance in each band by what differs between periods, (bands,).
+
+        In a loop noise is not white: the controller answers that of the encoder. None for one
+        period, or where periods are equal.
+        """
+        rows = np.concatenate([lapped(row, self.hop).reshape(-1, self.hop) for row in scatter])
+        if not rows.any():
+            return None
+        squares = np.mean(rows[:, : self.lines] ** 2, axis=0)
+        return np.add.reduceat(squares, self.edges[:-1]) / np.diff(self.edges)
 
     @property
     def player(self) -> RecordSimulator:
         """What plays the runs; that of slow ones plays nothing."""
         assert isinstance(self.simulator, RecordSimulator)
         return self.simulator
+
+    def played_by(self, simulator: RecordSimulator, noise_power: np.ndarray) -> Evidence:
+        """Return the same records beside other simulations, with other noise.
+
+        Args:
+            simulator: plays the runs.
+            noise_power: variance of an error in each cell, (cells,), rad2.
+        """
+        other = copy.copy(self)
+        other.simulator, other.noise_power = simulator, noise_power
+        return other
 
     def parts_for(self, *purposes: Purpose) -> tuple[int, ...]:
         """Return the indices of the parts for some purposes."""

@@ -39,20 +39,25 @@ class Part:
     stretch: int
 
 
-def cut(records: RecordSet, hop: int) -> list[Part]:
+def cut(records: RecordSet, hop: int, run_in: int = 0) -> list[Part]:
     """Cut records into parts, and give each a purpose.
 
     Levels of three records or more have whole records for each purpose; of two, the second one
     selects and reports, block by block; a single one serves all three.
+
+    Args:
+        records: the records.
+        hop: half the length of a window, samples.
+        run_in: samples at the start of each that belong to no part.
     """
-    parts = []
+    parts, first = [], -(-run_in // hop)
     for number, level in enumerate(records.levels):
         members = [i for i, r in enumerate(records.records) if r.level == level]
         members.sort(key=lambda i: -float(np.abs(records.records[i].torque).max()))
         for place, index in enumerate(members):
             count = windows_in(records.records[index].samples, hop)
-            blocks = max(count // _WINDOWS_PER_BLOCK, 1)
-            ends = np.linspace(0, count, blocks + 1).astype(int)
+            blocks = max((count - first) // _WINDOWS_PER_BLOCK, 1)
+            ends = np.linspace(first, count, blocks + 1).astype(int)
             for block in range(blocks):
                 purpose = _purpose(len(members), place, block + number)
                 windows = slice(int(ends[block]), int(ends[block + 1]))

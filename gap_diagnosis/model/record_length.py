@@ -7,6 +7,8 @@ from dataclasses import replace
 from fjr_kit.errors import InputError
 from fjr_records.records import Record, RecordSet
 
+from .steady_runs import SteadyRuns
+
 LEAST_SAMPLES = 64
 """Of each record: eight of the shortest windows."""
 LONGEST_S = 300.0
@@ -21,6 +23,8 @@ def within(records: RecordSet) -> tuple[RecordSet, list[str]]:
                 f"{record.name}: holds {record.samples} samples, too few to cut into windows; "
                 f"record {LEAST_SAMPLES} or more."
             )
+    if isinstance(records, SteadyRuns):  # they were chosen by their length
+        return records, []
     total = sum(r.samples for r in records.records) / records.sample_rate_hz
     if total <= LONGEST_S:
         return records, []

@@ -6,73 +6,33 @@ drives the model, and an observer holds its motion to the recorded position (`pr
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
-from controller_node.transfer_function import TransferFunction
 from fjr_kit.errors import InputError
 from fjr_records.record_noise import RecordNoise
-from fjr_records.records import Record, RecordSet
-from fjr_sim_node.simulation.closed_loop import Trajectory, simulate_law
+from fjr_records.records import RecordSet
+from fjr_sim_node.simulation import rig
+from fjr_sim_node.simulation.closed_loop import State
 
+from .drive import Drive
 from .prediction import CROSSOVER_SHARE, model_observer
 from .record_loop import RecordLoop, loop_of, without_erratic, without_swinging
+from .record_start import start_of
 from .rig_model import Model, too_stiff
 from .simulated_rig import run_parallel
+from .steady_runs import SteadyRuns
 
 _SMALL = 1e-4  # relative: a change of an inertia that must not grow
-_AT_REST = 5.0  # standard deviations of noise that a record at rest may begin away from zero
-_FIRST_SAMPLES, _HIGHEST_DEGREE = 10, 4
-_ONLY_NOISE = 1.1  # standard deviations that a fit to the first samples leaves by chance
-
-
-@dataclass(frozen=True)
-class Drive:
-    """What drives a simulation of one run: the loop that was recorded, or an observer.
-
-    Attributes:
-        reference: r of the law, float64 (samples,) in rad: the recorded one, or the recorded
-            position where an observer holds the motion to it.
-        law: the controller, or the observer.
-        command: recorded torque that drives the model, (samples,) in N m; None in the loop.
-        added: recorded torque that the law does not make, likewise; None where it makes all.
-        start: position (rad) and velocity (rad/s) that the encoder reads at the first sample.
-        entry: state of the law before it; None for zero.
-        elapsed_s: time since the first run began, for what drifts.
-    """
-
-    reference: np.ndarray
-    law: TransferFunction
-    command: np.ndarray | None
-    start: tuple[float, float]
-    entry: np.ndarray | None = None
-    elapsed_s: float = 0.0
-    added: np.ndarray | None = None
-
-    @property
-    def observed(self) -> bool:
-        """Whether an observer takes the place of a controller that is not known."""
-        return self.command is not None
-
-    def simulated(
-        self, sample_rate_hz: float, p: tuple[float, ...], e: np.ndarray | None
-    ) -> Trajectory:
-        """Return the simulated run of a rig.
-
-        Args:
-            sample_rate_hz: rate of the samples.
-            p: from `plant.coefficients`.
-            e: from `effects.coefficients`, or None.
-
-        Raises:
-            InputError: the motion diverged.
-        """
-        return simulate_law(
-            self.reference, sample_rate_hz, p, self.law, None, e, self.elapsed_s,
-            command=self.command, added=self.added, start=self.start, controller_state=self.entry,
-        )  # fmt: skip
+_SETTLED = (1e-6, 1e-4)
+"""Least and greatest part of the rms position that is left of a transient; between them the noise
+of a line, for a tail that lies in one line must not count there."""
+_BENT = {"jm": 1.1, "j": 1.1, "fs": 1.2, "fsm": 1.2, "fv": 1.2, "fvm": 1.2, "k0": 0.9}
+"""Factors on the parameters of a model that must forget the state of the one it begins near."""
+_FORGOTTEN = 3.0  # times what may be left of a transient
+_SLOWER = 1.5  # times as long as it took the model that is simulated first
 
 
 class RecordSimulator:
@@ -100,8 +60,10 @@ class RecordSimulator:
         """
         self.records = records
         self._rate = records.sample_rate_hz
+        self._added: Sequence[np.ndarray] | None = None
+        self._named = False
         self.loop: RecordLoop = without_swinging(loop_of(records), records)
-        self._starts = [_start(r, noise) for r in records.records]
+        self._starts = [start_of(r, noise) for r in records.records]
         self._speeds = [float(np.std(np.diff(r.position)) * self._rate) for r in records.records]
         self._torques = [float(np.abs(r.torque).max()) for r in records.records]
         self.crossover_hz, self._observer = model_observer(
@@ -109,7 +71,36 @@ class RecordSimulator:
         )
         self._entries = [self._entry(index) for index in range(len(records.records))]
         names = [r.name for r in records.records]
+        self._begins: dict[int, tuple[int, State]] = {}
         self.loop = without_erratic(self.loop, names, self._growth(Model.nominal(nominal)))
+        if isinstance(records, SteadyRuns):
+            self._begins = self._near_steady(Model.nominal(nominal), records.run_in, noise)
+
+    def adding(self, signals: Sequence[np.ndarray] | None) -> RecordSimulator:
+        """Return a simulator that adds signals to y, u and q of models whose encoder is smooth.
+
+        Args:
+            signals: what rounding adds on the average to each run, float64 (3, samples); None for
+                nothing.
+        """
+        other = copy.copy(self)
+        other._added, other._named = signals, False
+        return other
+
+    def naming(self) -> RecordSimulator:
+        """Return a simulator that adds the same to models whose encoder rounds, and to no others.
+
+        It plays these with a smooth encoder: no rounding that is simulated is that of the record,
+        sample by sample.
+        """
+        other = copy.copy(self)
+        other._named = True
+        return other
+
+    @property
+    def adds(self) -> bool:
+        """Whether it adds what rounding does."""
+        return self._added is not None
 
     def _entry(self, index: int) -> np.ndarray | None:
         """Return the state in which the law of a run enters it; None for zero."""
@@ -129,6 +120,68 @@ class RecordSimulator:
             moved = float(np.sqrt(np.mean(one[0] ** 2))) + 1e-300
             growth[index] = change / moved / _SMALL if np.isfinite(change) else np.inf
         return growth
+
+    def _near_steady(
+        self, nominal: Model, run_in: int, noise: RecordNoise
+    ) -> dict[int, tuple[int, State]]:
+        """Return where runs may begin that lead to a steady period, and in which state.
+
+        A model that is near to the nominal is sooner in its steady state from that one's than from
+        rest, unless it remembers for longer.
+        """
+        std = noise.std_rad if noise.known else 0.0
+        indices = range(len(self.records.records))
+        begins = run_parallel(lambda index: self._begin_near(nominal, index, run_in, std), indices)
+        return {i: begin for i, begin in zip(indices, begins, strict=True) if begin is not None}
+
+    def _begin_near(
+        self, model: Model, index: int, run_in: int, noise_rad: float
+    ) -> tuple[int, State] | None:
+        """Return from which sample on a run has to be simulated, and the state before.
+
+        How long before the steady period says the model's own way from rest: when its first period
+        has come near the last one, nearer where there is less noise.
+        """
+        drive, samples = self.drive(index), self.records.records[index].samples
+        period = samples - run_in
+        if self.too_stiff(model, index):
+            return None
+        try:
+            first = drive.simulated(self._rate, *self._coefficients(model))
+            off = np.abs(first.position[:period] - first.position[run_in:])
+            rms = float(np.std(first.position[run_in:]))
+            limit = min(max(noise_rad / period**0.5, _SETTLED[0] * rms), _SETTLED[1] * rms)
+            settled = int(_SLOWER * np.flatnonzero(np.append(True, off > limit))[-1])
+            begin = run_in - settled
+            if begin <= 0:
+                return None
+            until = drive.part(slice(begin)).simulated(self._rate, *self._coefficients(model))
+        except InputError:
+            return None
+        now = drive.elapsed_s + begin / self._rate
+        middle = float(first.motor[run_in:].mean())
+        rig.complete(until.end.rig, float(until.torque[-1]), now, middle)
+        found = begin, until.end
+        return found if self._forgets(model, drive, run_in, found, limit) else None
+
+    def _forgets(
+        self, model: Model, drive: Drive, run_in: int, begun: tuple[int, State], limit: float
+    ) -> bool:
+        """Tell whether another model forgets in which state it began.
+
+        Where friction holds a small motion, the place about which it moves depends on the way
+        there for ever.
+        """
+        bent = {n: v * _BENT.get(n, 1.0) for n, v in model.plant.items()}
+        other = self._coefficients(Model(bent, {}))
+        first, state = begun
+        try:
+            cold = drive.simulated(self._rate, *other).position[run_in:]
+            near = drive.part(slice(first, None), state).simulated(self._rate, *other)
+        except InputError:
+            return False
+        off = near.position[run_in - first :] - cold
+        return float(np.sqrt(np.mean(off**2))) <= _FORGOTTEN * limit
 
     def response(self, frequency_hz: np.ndarray, index: int) -> np.ndarray:
         """Return C_y of what holds a run: its controller, or the observer; complex, N m/rad."""
@@ -162,7 +215,7 @@ class RecordSimulator:
         model, index = job
         record = self.records.records[index]
         try:
-            run = self._observed(index).simulated(self._rate, *_coefficients(model))
+            run = self._observed(index).simulated(self._rate, *self._coefficients(model))
             return run.torque - record.torque
         except InputError:
             return np.full(record.samples, np.nan)
@@ -184,47 +237,51 @@ class RecordSimulator:
             record.position, self._observer, record.torque, start, elapsed_s=record.elapsed_s
         )
 
+    def disturbed(self, model: Model, index: int, noise: np.ndarray) -> np.ndarray:
+        """Return y, u and q of a model in one run, to which nothing is added, with encoder noise.
+
+        Args:
+            model: the model.
+            index: of the run.
+            noise: (samples,), rad.
+
+        Returns:
+            float64 (3, samples); NaN where the motion diverges.
+        """
+        try:
+            drive = self.drive(index)
+            run = drive.simulated(self._rate, *self._coefficients(model), noise)
+        except InputError:
+            return np.full((3, self.records.records[index].samples), np.nan)
+        return np.array([run.position, run.torque, run.motor if model.rigid else run.link])
+
     def _one(self, job: tuple[Model, int]) -> np.ndarray:
         model, index = job
         if self.too_stiff(model, index):
             return np.full((3, self.records.records[index].samples), np.nan)
+        drive, samples = self.drive(index), self.records.records[index].samples
+        first, state = (0, None) if model.settles_slowly else self._begins.get(index, (0, None))
+        if state is not None:
+            drive = drive.part(slice(first, None), state)
         try:
-            run = self.drive(index).simulated(self._rate, *_coefficients(model))
+            run = drive.simulated(self._rate, *self._coefficients(model))
         except InputError:
-            return np.full((3, self.records.records[index].samples), np.nan)
-        return np.array([run.position, run.torque, run.motor if model.rigid else run.link])
+            return np.full((3, samples), np.nan)
+        out = np.array([run.position, run.torque, run.motor if model.rigid else run.link])
+        if first:
+            record = self.records.records[index]
+            link = record.position if record.link is None else record.link
+            before = np.array([record.position, record.torque, link])[:, :first]
+            out = np.concatenate([before, out], axis=1)
+        if self._added is None or model.rounds != self._named:
+            return out
+        return out + self._added[index]
+
+    def _coefficients(self, model: Model) -> tuple[tuple[float, ...], np.ndarray | None]:
+        played = model.smooth if self._named else model
+        return played.plant_coefficients, played.effect_coefficients
 
     def too_stiff(self, model: Model, index: int) -> bool:
         """Tell whether a model would take so long to play as no record can call for."""
         samples = self.records.records[index].samples
         return too_stiff(model, samples, self._rate, self._speeds[index], self._torques[index])
-
-
-def _coefficients(model: Model) -> tuple[tuple[float, ...], np.ndarray | None]:
-    return model.plant_coefficients, model.effect_coefficients
-
-
-def _start(record: Record, noise: RecordNoise) -> tuple[float, float]:
-    """Return position (rad) and velocity (rad/s) at the first sample; zero where noise explains.
-
-    The polynomial of lowest degree that leaves no more than noise tells a run that begins to move
-    from rest, whose speed grows from zero, from one that moves already.
-    """
-    first = record.position[:_FIRST_SAMPLES]
-    std = noise.std_rad if noise.known else 0.0
-    if np.abs(first).max() <= _AT_REST * std:
-        return 0.0, 0.0
-    if np.ptp(first) <= 2.0 * _AT_REST * std:
-        return float(first.mean()), 0.0
-    time = np.arange(first.size) / record.description.sample_rate_hz
-    for degree in range(1, _HIGHEST_DEGREE + 1):
-        powers = np.vander(time / time[-1], degree + 1, increasing=True)
-        found = np.linalg.lstsq(powers, first, rcond=None)[0]
-        left = first - powers @ found
-        scatter = float(np.sqrt(left @ left / (first.size - found.size)))
-        if scatter <= _ONLY_NOISE * std:
-            break
-    error = max(scatter, std) * np.sqrt(np.diag(np.linalg.inv(powers.T @ powers)))
-    if np.all(np.abs(found[:2]) <= _AT_REST * error[:2]):
-        return 0.0, 0.0
-    return float(found[0]), float(found[1] / time[-1])

@@ -75,6 +75,12 @@ class Model:
         return any(name.startswith("encoder_quantization.") for name in self.effects)
 
     @property
+    def smooth(self) -> Model:
+        """The same with an encoder that does not round."""
+        left = {n: v for n, v in self.effects.items() if not n.startswith("encoder_quantization.")}
+        return replace(self, effects=left)
+
+    @property
     def plant_coefficients(self) -> tuple[float, ...]:
         """Bare parameters as the compiled plant takes them."""
         return plant.coefficients({**self.whole_plant, **self.effects})

@@ -22,11 +22,10 @@ from fjr_records.periodic import RecordedExperiment
 from fjr_records.spectra import line_spectrum
 from fjr_sim_node.simulation.closed_loop import simulate
 
-from ..model.misfit import MODEL_ERROR
 from ..model.rig_model import Model
 from ..model.simulated_rig import last_samples, run_parallel
 from ..outcome.diagnosis import NextExperiment
-from ..which.fits import Fit
+from ..which.comparison import CellFit
 from .trials import Trial, trials
 
 LEAST_SIGMA = 10.0
@@ -37,6 +36,7 @@ TORQUE_MARGIN = 2.5
 """A trial may ask for so many times the torque of the record."""
 MOST_RIVALS = 4
 _STEP = 1e-4
+_MODEL_ERROR = 1e-3  # of a line: error of the simulation itself
 _REFINED = 2  # trials whose separation is computed with refits that are not only linear
 _PASSES = 3
 
@@ -44,7 +44,7 @@ Pair = tuple[int, int]
 
 
 def next_experiment(
-    recorded: RecordedExperiment, noise_std: np.ndarray, fits: Sequence[Fit]
+    recorded: RecordedExperiment, noise_std: np.ndarray, fits: Sequence[CellFit], misfit: float
 ) -> NextExperiment | None:
     """Choose the experiment that best separates explanations, for the rig time it costs.
 
@@ -52,6 +52,7 @@ def next_experiment(
         recorded: the experiment so far.
         noise_std: `NoiseLevels.of_outputs`, (realizations, outputs, lines), rad.
         fits: the explanations that the data leave, best first; at most four are compared.
+        misfit: mean squared error over noise that the best one leaves; counts as noise.
 
     Returns:
         None with fewer than two explanations, where the loop cannot be simulated, or where no
@@ -60,7 +61,7 @@ def next_experiment(
     rivals = list(fits)[:MOST_RIVALS]
     if len(rivals) < 2 or not recorded.repeatable:
         return None
-    bench = _Bench(recorded, noise_std, rivals)
+    bench = _Bench(recorded, noise_std, rivals, misfit)
     screened = [(t, found) for t in trials(recorded, bench.rigid) if (found := bench.linear(t))]
     screened.sort(key=lambda one: bench.merit(*one), reverse=True)
     refined = [(t, bench.refitted(t)) for t, _ in screened[:_REFINED]]
@@ -99,7 +100,11 @@ class _Bench:
     """Simulates trials with the rivals; the first realization of a trial stands for all."""
 
     def __init__(
-        self, recorded: RecordedExperiment, noise_std: np.ndarray, fits: Sequence[Fit]
+        self,
+        recorded: RecordedExperiment,
+        noise_std: np.ndarray,
+        fits: Sequence[CellFit],
+        misfit: float,
     ) -> None:
         description = recorded.experiment
         self._rate = description.sample_rate_hz
@@ -111,10 +116,9 @@ class _Bench:
         self._most_torque = TORQUE_MARGIN * max(torques)
         self._noise = np.median(noise_std, axis=0)
         self._fits = list(fits)
-        # What even the best explanation leaves counts as noise.
-        self._left = max(1.0, min(f.train_chi2 / f.solution.residuals.size for f in fits)) ** 0.5
-        # What the recorded data say of each rival's parameters.
-        self._held = [np.linalg.qr(f.solution.jacobian)[1] / self._left for f in fits]
+        self._left = max(1.0, misfit) ** 0.5
+        # What the recorded data say of each rival's parameters, by what it leaves.
+        self._held = [np.linalg.qr(f.solution.jacobian)[1] for f in fits]
 
     @property
     def rigid(self) -> bool:
@@ -175,7 +179,7 @@ class _Bench:
         outputs = [0, 2][: self._noise.shape[0]]
         return line_spectrum(self._run(trial, models)[:, outputs], trial.lines)
 
-    def _response(self, trial: Trial, fit: Fit) -> _Response:
+    def _response(self, trial: Trial, fit: CellFit) -> _Response:
         x, steps = fit.solution.x, _steps(fit, fit.solution.x)
         points = np.vstack([x, x + np.diag(steps)])
         lines = self._lines(trial, [fit.space.model(point) for point in points])
@@ -225,13 +229,13 @@ class _Bench:
         noise = self._noise
         beyond = max(trial.lines - noise.shape[1], 0)
         noise = np.concatenate([noise, np.repeat(noise[:, -1:], beyond, axis=1)], axis=1)
-        weight = np.sqrt(2.0) / np.hypot(noise[:, : trial.lines], MODEL_ERROR * np.abs(target))
+        weight = np.sqrt(2.0) / np.hypot(noise[:, : trial.lines], _MODEL_ERROR * np.abs(target))
         weight[:, 0] /= np.sqrt(2.0)
         weight[1:, 0] = 0.0
         return weight / self._left
 
 
-def _steps(fit: Fit, x: np.ndarray) -> np.ndarray:
+def _steps(fit: CellFit, x: np.ndarray) -> np.ndarray:
     """Return steps of finite differences that stay within the bounds."""
     return np.where(x + _STEP <= fit.space.bounds()[1], _STEP, -_STEP)
 

@@ -55,7 +55,7 @@ class Gaps(ResultModel):
 
 
 class Figure(ResultModel):
-    """A figure with its 95 % interval; the interval is None where one realization is held out."""
+    """A figure with its 95 % interval, which is None where a single part was looked at."""
 
     value: Number
     low: OptionalNumber
@@ -67,7 +67,7 @@ class StageFigures(ResultModel):
 
     Attributes:
         nominal, refit, explained: of the simulation; None where it diverges.
-        noise_floor: what noise alone leaves; None where one period was kept.
+        noise_floor: what noise alone leaves; None where that is not known.
         closed: 1 - (explained^2 - floor^2)/(refit^2 - floor^2); None without an effect, where the
             refit leaves nothing that differs from noise, where the effect brings the simulation no
             nearer, and for an effect that acts like noise.
@@ -107,12 +107,18 @@ class Bags(ResultModel):
 
 
 class GapFigures(ResultModel):
-    """The gap with intervals; see `held_out_gap` for what each figure is."""
+    """The gap with intervals, see `ledger` and `bla_gap` for what each figure is.
 
-    position: StageFigures
+    Attributes:
+        position: rms error over rms; None where torques were compared.
+        torque: rms error over rms.
+        bla_sigma, distortion_db: of steady periods; None for records.
+    """
+
+    position: StageFigures | None = None
     torque: StageFigures
-    bla_sigma: StageFigures
-    distortion_db: StageFigures
+    bla_sigma: StageFigures | None = None
+    distortion_db: StageFigures | None = None
 
 
 class Place(ResultModel):
@@ -254,7 +260,7 @@ class Diagnosis(Document):
         gap: the gaps at each stage.
         gap_closed: share of what the refit left that the effect explains; None without an effect,
             and where a share means nothing.
-        gap_figures: the gap in four figures with intervals; None where nothing was simulated.
+        gap_figures: the gap with intervals; None where nothing was simulated.
         bags: what changes from bag to bag; None where that cannot be tested.
         where: the places of the gap, strongest first.
         ranking: all explanations that were fitted, best first.

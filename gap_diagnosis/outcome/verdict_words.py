@@ -169,7 +169,8 @@ def closed(diagnosis: Diagnosis) -> str:
         )
         return f"No share of the gap is stated: {why}."
     figures = diagnosis.gap_figures
-    share = figures.position.closed if figures else None
+    main = None if figures is None else figures.position or figures.torque
+    share = None if main is None else main.closed
     sure = ""
     if share is not None and share.low is not None and share.high is not None:
         sure = f" (95 %: {share.low:.1%} to {share.high:.1%})"

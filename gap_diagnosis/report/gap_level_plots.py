@@ -8,7 +8,7 @@ from bla_analyzer.results.result import LineLevels
 from bla_analyzer.results.summary import decibel, phase_deg
 from fjr_kit.plots import SECONDS, Options, Plot, Trace, extremes, linked, stack, trace
 
-from ..how_far.comparison import LevelComparison, Response
+from ..how_far.bla_comparison import LevelComparison, Response
 
 MODEL_STYLES = {
     "nominal": ("nominal", "--noise", "dot"),

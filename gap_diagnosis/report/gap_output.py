@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -20,15 +20,14 @@ from fjr_kit.atomic import result_folder, write_whole
 from fjr_kit.figure_style import STYLE, save
 from fjr_sim_node.simulation.simulator import SIMULATOR
 
+from ..how_far.run_comparison import RunComparison
+from ..how_far.steady_view import SteadyView
 from ..investigation import Investigation
-from ..outcome.diagnosis import Diagnosis
-from ..record_investigation import RecordInvestigation
 from .gap_figures import draw_residual_torque, draw_sigma_lines, draw_sigma_maps
 from .gap_plots import STAGES
-from .gap_report import render_gap_report, stages
+from .gap_report import compared, render_gap_report
 from .randomisation import randomisation_yaml, ranges
-from .record_figures import record_figures
-from .record_report import compared, render_record_report
+from .run_figures import run_figures
 from .updated_parameters import updated_values
 from .waterfall import bars, draw_waterfall
 
@@ -48,7 +47,7 @@ Drawing = Callable[[], Figure]
 
 
 def write_diagnosis(
-    investigation: Investigation | RecordInvestigation,
+    investigation: Investigation,
     out: Path | str,
     *,
     progress: Progress = lambda _: None,
@@ -83,16 +82,9 @@ def write_diagnosis(
             progress("writing randomisation.yaml")
             found = ranges(investigation.diagnosis.parameters, investigation.diagnosis.bags)
             write_whole(folder / "randomisation.yaml", randomisation_yaml(found))
-        made = provenance(command, date)
-        if isinstance(investigation, RecordInvestigation):
-            compare = compared(investigation)
-            drawings = record_figures(compare, known=investigation.evidence.noise.known)
-            text = render_record_report(investigation, compare, made)
-        else:
-            drawings = dict(_figures(investigation))
-            text = render_gap_report(investigation, made)
-        drawings = {**_waterfall(investigation.diagnosis), **drawings}
-        _write_figures(drawings, folder / "figures", progress)
+        runs = compared(investigation)
+        text = render_gap_report(investigation, runs, provenance(command, date))
+        _write_figures(_drawings(investigation, runs), folder / "figures", progress)
         progress("writing report.html")
         (folder / "report.html").write_text(text, encoding="utf-8")
     return Path(out) / "report.html"
@@ -109,22 +101,29 @@ def _write_figures(drawings: Mapping[str, Drawing], folder: Path, progress: Prog
             save(draw(), folder / name)
 
 
-def _waterfall(diagnosis: Diagnosis) -> dict[str, Drawing]:
-    return {"waterfall": partial(draw_waterfall, diagnosis)} if bars(diagnosis) else {}
+def _drawings(investigation: Investigation, found: Sequence[RunComparison]) -> dict[str, Drawing]:
+    """Return what draws each figure by its name."""
+    drawings: dict[str, Drawing] = {}
+    if bars(investigation.diagnosis):
+        drawings["waterfall"] = partial(draw_waterfall, investigation.diagnosis)
+    if investigation.fitted is not None:
+        drawings |= run_figures(found, known=investigation.fitted.evidence.noise.known)
+    if investigation.steady is not None and investigation.steady.models:
+        drawings |= dict(_steady_figures(investigation.steady))
+    return drawings
 
 
-def _figures(investigation: Investigation) -> Iterator[tuple[str, Drawing]]:
-    models = stages(investigation)
-    if not models:
-        return
-    maps = {STAGES[name]: investigation.maps[name] for name in models}
-    if investigation.noise is not None and all(_finite(found) for found in maps.values()):
+def _steady_figures(view: SteadyView) -> Iterator[tuple[str, Drawing]]:
+    maps = {STAGES[name]: found for name, found in view.maps.items()}
+    if view.noise is not None and all(_finite(found) for found in maps.values()):
         yield "where_position", partial(draw_sigma_maps, maps, "position")
         yield "where_torque", partial(draw_sigma_maps, maps, "torque")
         yield "sigma_refit", partial(draw_sigma_lines, maps[STAGES["refit"]])
-    torques = investigation.residual_torques
-    before, after = torques["refit"], torques.get("explained")
-    yield "residual_torque", partial(draw_residual_torque, before, after)
+    torques = view.residual_torques
+    yield (
+        "residual_torque",
+        partial(draw_residual_torque, torques["refit"], torques["explained"]),
+    )
 
 
 def _finite(found: Any) -> bool:

@@ -1,4 +1,4 @@
-"""Interactive plots of where the gap lies, of the ranking, and of the residual torque."""
+"""Interactive plots of steady periods: where the gap lies, and the residual torque."""
 
 from __future__ import annotations
 
@@ -14,17 +14,13 @@ from fjr_kit.plots import (
     Plot,
     Trace,
     frequency_layout,
-    layout,
     numbers,
     trace,
 )
 
-from ..outcome.verdict_words import explanation
 from ..where.residual_map import KINDS, ResidualMap, Signal
 from ..where.residual_torque import ResidualTorque
 from ..where.torque_curves import COORDINATES, Coordinate, curve
-from ..which.attribution import Attribution
-from ..which.fits import Fit
 
 SIGMA = "\N{GREEK SMALL LETTER SIGMA}"
 STAGES = {"nominal": "nominal", "refit": "after the refit", "explained": "best explanation"}
@@ -114,70 +110,6 @@ def sigma_plot(maps: Mapping[str, ResidualMap], row: int, signal: Signal) -> Plo
             f = found.frequency_hz[lines]
             traces.append(trace(f, sigma, name, color, **mark, unit=SIGMA))
     return {"data": traces, "layout": axes, "linked": True}
-
-
-def ranking_plot(attribution: Attribution, held_size: int, data: str = "held-out") -> Plot:
-    """Return the misfit of every explanation; the tie zone is shaded.
-
-    Args:
-        attribution: what the search found.
-        held_size: degrees of freedom of the data that explanations are ranked on.
-        data: what these are called.
-    """
-    fits = [attribution.refit, *attribution.candidates]
-    fits.sort(key=lambda fit: -fit.held_chi2)
-    misfit = np.array([fit.held_chi2 / held_size for fit in fits])
-    at = np.arange(len(fits), dtype=float)
-    ends = np.array([-0.7, len(fits) - 0.3])
-    tied = [fit.held_chi2 / held_size for fit in (attribution.best, *attribution.tied)]
-    traces = [_zone(min(tied) / 1.1, max(tied) * 1.1, ends)]
-    for converged, name, symbol in ((True, "converged", "circle"), (False, "not ranked", "x-thin")):
-        chosen = np.array([fit.converged == converged for fit in fits])
-        if chosen.any():
-            traces.append(_ranked(misfit[chosen], at[chosen], name, symbol))
-    refit = misfit[fits.index(attribution.refit)]
-    traces += [_line(1.0, ends, "noise", "--noise"), _line(refit, ends, "refit", "--model")]
-    axes = layout(f"{data} misfit", "", log_x=True)
-    axes["xaxis"] |= {"tickformat": ""}
-    axes["yaxis"] |= {
-        "tickvals": at.tolist(),
-        "ticktext": [_name(fit) for fit in fits],
-        "range": ends.tolist(),
-        "showgrid": False,
-    }
-    return {"data": traces, "layout": axes}
-
-
-def _name(fit: Fit) -> str:
-    return explanation(list(fit.effects)) if fit.effects else "refit alone"
-
-
-def _zone(low: float, high: float, ends: np.ndarray) -> Trace:
-    bottom, top = ends.tolist()
-    return {
-        "type": "scatter",
-        "mode": "lines",
-        "x": [low, high, high, low, low],
-        "y": [bottom, bottom, top, top, bottom],
-        "fill": "toself",
-        "fillcolor": "--rule",
-        "line": {"width": 0, "color": "--rule"},
-        "name": "as good as the best",
-        "hoverinfo": "skip",
-    }
-
-
-def _ranked(misfit: np.ndarray, at: np.ndarray, name: str, symbol: str) -> Trace:
-    color = "--excited" if symbol == "circle" else "--muted"
-    note = f"{PLAIN}<extra>%{{fullData.name}}</extra>"
-    made = trace(misfit, at, name, color, symbol=symbol, size=9, hovertemplate=note)
-    made["marker"]["line"] = {"width": 1.5, "color": color}
-    return made
-
-
-def _line(x: float, ends: np.ndarray, name: str, color: str) -> Trace:
-    note = "<extra>%{fullData.name}</extra>"
-    return trace([x, x], ends, name, color, dash="dash", hovertemplate=note)
 
 
 def torque_plot(before: ResidualTorque, after: ResidualTorque | None, level: int) -> Plot:

@@ -12,11 +12,10 @@ from bla_analyzer.results.summary import mean_level_db
 from fjr_kit.page import Cell, Column, Mark, Row
 
 from ..gates.gate_checks import GateReport
-from ..how_far.comparison import LevelComparison, Response, bla_distance_db, bla_distance_sigma
+from ..how_far.bla_comparison import LevelComparison, Response, bla_distance_db, bla_distance_sigma
 from ..outcome.cause_words import cause_name, digits, percent, place_words, share_words
 from ..outcome.diagnosis import Diagnosis, Estimate, Figure, Gap
 from ..outcome.verdict_words import explains, explanation, unit_of
-from ..which.attribution import Attribution
 from ..which.search_space import Space
 from .gap_level_plots import MODEL_STYLES
 
@@ -41,20 +40,6 @@ def places(diagnosis: Diagnosis) -> list[Row]:
         (p.signal, p.lines, str(p.level), *p.band_hz, p.sigma)
         for p in diagnosis.where[:MOST_PLACES]
     ]
-
-
-def candidates(attribution: Attribution, diagnosis: Diagnosis, held_size: int) -> list[Row]:
-    """Return every explanation with misfit, gain, convergence and effect parameters."""
-    refit = attribution.refit
-    left = refit.held_chi2 / held_size
-    rows: list[Row] = [("refit alone", left, 0.0, _converged(refit.converged), "")]
-    for candidate in diagnosis.ranking:
-        misfit = nan if candidate.held_out_chi2 is None else candidate.held_out_chi2
-        gain = nan if candidate.delta is None else candidate.delta
-        values = [_estimate(n, e) for n, e in candidate.parameters.items()]
-        found = _converged(candidate.converged)
-        rows.append((explanation(candidate.effects), misfit, gain, found, values))
-    return rows
 
 
 def _converged(converged: bool) -> Cell:
@@ -144,11 +129,12 @@ def gap_table(diagnosis: Diagnosis) -> dict[str, Any] | None:
         return None
     stages = _shown(diagnosis)
     columns = [Column(""), *(Column(LABELS[stage]) for stage in stages)]
-    shares = any(getattr(found, name).closed is not None for name in FIGURES)
+    known = {name: figure for name in FIGURES if (figure := getattr(found, name)) is not None}
+    shares = any(figure.closed is not None for figure in known.values())
     columns += [Column("closed", "of what the refit left, %")] if shares else []
     rows: list[Row] = []
-    for name, (label, factor) in FIGURES.items():
-        figure = getattr(found, name)
+    for name, figure in known.items():
+        label, factor = FIGURES[name]
         cells = [_interval(getattr(figure, stage), factor) for stage in stages]
         if shares:
             cells.append(_interval(figure.closed, 100.0))

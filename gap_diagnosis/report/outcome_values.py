@@ -1,4 +1,4 @@
-"""What every report of a diagnosis shows, of steady periods or of records: common values."""
+"""What the report shows of any diagnosis, of steady periods or of records."""
 
 from __future__ import annotations
 

@@ -9,9 +9,8 @@ for is said in `cell_weights`.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -20,15 +19,15 @@ from fjr_sim_node import effects as fx
 
 from ..model.evidence import Evidence
 from ..model.rig_model import Model
-from .cell_weights import CellWeights
+from .comparison import NOTHING_LEFT, CellFit, Comparison
 from .from_parts import from_part
-from .least_squares import Solution, solve
-from .ripples_of_records import RecordRipples
+from .least_squares import solve
+from .ripples import Ripples
+from .ripples_passed import fewest_cycles
 from .scales import Scales
 from .screening import LARGEST, LARGEST_OF_TORQUES, Proposal, Screening
 from .search_space import Space, space_for, starts
 from .seen_torques import LOADS, SeenTorques
-from .unseen_friction import beside_scatter, deviated
 
 _REFIT_ROUNDS = (8, 5, 5)
 _ADDED_ROUNDS = (6, 4)
@@ -36,62 +35,34 @@ _LEAST_PROMISE = 20.0  # a start that gains less than this (twice the nats) is n
 _STARTS = 2
 RIPPLES_TRIED = 3
 _RIVAL = 0.05  # an error: a second start that costs so much more than the first is not pursued
-_ACTS = (
-    0.1  # of what is left in a band of a part: an effect that moves it by less does not act there
-)
+_FURTHER = 4  # times that a fit is taken further at the most
+_STILL_FALLS = 0.8  # of its misfit
 
 
-@dataclass(frozen=True)
-class CellFit:
-    """One explanation after fitting.
-
-    Attributes:
-        effects: identifiers in the order in which they were added.
-        space: what was free.
-        model: the fitted model.
-        solution: the optimiser's end, its residuals and Jacobian times `CellFitter.weight`.
-        variance: (cells,), of an error in each cell, rad2.
-        left: (parts, bands), mean square of what is left on each part that selects, noise and the
-            simulation's own error added, rad2.
-        acts: (parts,), whether the effect that was added last moves a part that selects; None
-            where that was not looked at.
-    """
-
-    effects: tuple[str, ...]
-    space: Space
-    model: Model
-    solution: Solution
-    variance: np.ndarray
-    left: np.ndarray
-    acts: np.ndarray | None = None
-
-
-class CellFitter:
+class CellFitter(Comparison):
     """Fits explanations to the evidence of records.
 
     Attributes:
-        evidence: the records.
         nominal: datasheet values of the base parameters.
         tolerance: how far one may be off, relative.
-        weights: of the errors of its fits.
-        fit_parts, select_parts: indices of parts.
+        fit_parts: indices of the parts that it fits.
         groups: (errors,), the stretch of time of each error of the fit, by its first part.
         runs: (errors,), the record of each error of the fit.
     """
 
     def __init__(self, evidence: Evidence, nominal: Mapping[str, float], tolerance: float) -> None:
         """Prepare."""
-        self.evidence, self.nominal, self.tolerance = evidence, dict(nominal), tolerance
-        self._rippled: tuple[CellFit, tuple[RecordRipples, SeenTorques]] | None = None
-        self.weights = CellWeights(evidence)
-        self.fit_parts, self.select_parts = self.weights.fit_parts, self.weights.select_parts
+        super().__init__(evidence)
+        self.nominal, self.tolerance = dict(nominal), tolerance
+        self._rippled: tuple[CellFit, tuple[Ripples, SeenTorques]] | None = None
+        self.fit_parts = self.weights.fit_parts
         self.groups, self.runs = evidence.stretch_of(self.fit_parts), self.weights.runs
         records = evidence.records
         self.scales = Scales.of_record(
             [r.position for r in records.records],
             [r.torque for r in records.records],
             records.sample_rate_hz,
-            evidence.lines * evidence.line_hz,
+            evidence.band_hz,
             self.nominal,
         )
 
@@ -100,7 +71,9 @@ class CellFitter:
         space = Space(self.nominal, (), (), self.tolerance, self.scales)
         first = self._begun((), space, space.point(Model(self.nominal, {})))
         left = first.solution.residuals / self.weights.weight(first.variance)
-        return self.further(first) if self.weights.learn(left) else first
+        if self.weights.learn(left):
+            first = self.further(first)
+        return first if self.left_in_a_band(first) < NOTHING_LEFT else self._while_it_falls(first)
 
     def screening(self, parent: CellFit, effect: str) -> Screening:
         """Return what the starts of an effect promise beside a fit."""
@@ -116,6 +89,17 @@ class CellFitter:
             seen = self._ripples(parent)[1].load(effect)
         seeds = [*starts(effect, self.scales, cycles, self.nominal), *seen]
         return self.screening_of(parent, seeds)
+
+    def two_harmonics(self, parent: CellFit, effect: str) -> list[dict[str, float]]:
+        """Return starts of a ripple with a second harmonic beside a fit, the best first.
+
+        Only of those numbers of cycles at which the motion passes enough to see one.
+        """
+        tried = self.scales.cycles()
+        tried = tried[tried >= fewest_cycles(self.scales)]
+        if not tried.size:
+            return []
+        return self._ripples(parent)[0].harmonics(effect, tried, RIPPLES_TRIED)
 
     def screening_of(self, parent: CellFit, seeds: Sequence[Mapping[str, float]]) -> Screening:
         """Return what starts promise beside a fit."""
@@ -195,24 +179,29 @@ class CellFitter:
         )
         return replace(ended, acts=fit.acts)
 
+    def to_its_end(self, fit: CellFit) -> CellFit:
+        """Return a fit taken further while what it leaves over noise still falls.
+
+        Weighed by what itself leaves, a fit may stay where it misses much in a cell, which then
+        counts for little. So it is also begun with the weights of noise, and the better one counts.
+        """
+        fit = self._while_it_falls(fit)
+        if not self.left_in_a_band(fit) > NOTHING_LEFT:
+            return fit
+        noise = self.weights.floor
+        other = self._reweighted(fit.effects, fit.space, fit.solution.x, noise, _REFIT_ROUNDS)
+        return replace(other, acts=fit.acts) if self.gains(other, fit).sum() > 0.0 else fit
+
+    def _while_it_falls(self, fit: CellFit) -> CellFit:
+        for _ in range(_FURTHER):
+            before, fit = fit, self.further(fit)
+            if not self.misfit(fit) < _STILL_FALLS * self.misfit(before):
+                break
+        return fit
+
     def taken_over(self, fit: CellFit) -> CellFit:
         """Return what the fit of another fitter comes to here, from where it ended there."""
         return self._begun(fit.effects, fit.space, fit.solution.x)
-
-    def acted(self, fit: CellFit, effect: str) -> np.ndarray:
-        """Return whether an effect moves each part that selects, beside what the fit leaves there.
-
-        A saturation does nothing where it is not reached; what such a part gains or loses says
-        something of the parameters beside it, and of friction that scatters from run to run.
-
-        Returns:
-            bool (parts,).
-        """
-        rest = {n: v for n, v in fit.model.effects.items() if not n.startswith(f"{effect}.")}
-        models = [fit.model, Model(fit.model.plant, rest)]
-        errors = self.evidence.errors(models, self.select_parts)
-        moved = self.weights.mean_squares(errors[1] - errors[0])
-        return np.any(moved >= _ACTS * fit.left, axis=1)
 
     def without(self, fit: CellFit, effect: str) -> CellFit:
         """Return a fit with one effect taken out and all else fitted anew.
@@ -228,40 +217,11 @@ class CellFitter:
         rest = tuple(e for e in fit.effects if e != effect)
         return self._begun(rest, space, space.point(fit.model))
 
-    def misfit(self, fit: CellFit) -> float:
-        """Return what a fit leaves on unseen parts over noise and the simulation's own error.
-
-        A mean over all errors: 1 where nothing else is left; NaN where noise is not known.
-        """
-        if not self.evidence.noise.known:
-            return math.nan
-        relative = fit.left / self.weights.select_floor - 1.0
-        return float(np.sum(self.weights.counts * relative) / self.weights.counts.sum())
-
-    def gains(self, after: CellFit, before: CellFit) -> np.ndarray:
-        """Return the log-likelihood that one fit gains over another on each part that selects.
-
-        With the variance of each band of each part unknown it is n/2 ln(left before/left after),
-        summed over bands of n independent numbers: no part counts by its size, and no outlier by
-        its square.
-
-        Returns:
-            (parts,), nats.
-        """
-        return self.weights.gained(after.left, before.left).sum(axis=1)
-
-    def _left(self, model: Model, variance: np.ndarray) -> np.ndarray:
-        others = deviated(model) if self.weights.unseen else []
-        errors = self.evidence.errors([model, *others], self.select_parts)
-        weight = self.weights.select_weight(variance)
-        alone = beside_scatter(errors, weight, self.weights.unseen)
-        return self.weights.mean_squares(alone) + self.weights.select_floor
-
-    def _ripples(self, parent: CellFit) -> tuple[RecordRipples, SeenTorques]:
+    def _ripples(self, parent: CellFit) -> tuple[Ripples, SeenTorques]:
         if self._rippled is None or self._rippled[0] is not parent:
             weight, solution = self.weights.weight(parent.variance), parent.solution
             at = self.evidence, self.fit_parts, parent.model
-            self._rippled = parent, (RecordRipples(*at, weight, solution), SeenTorques(*at))
+            self._rippled = parent, (Ripples(*at, weight, solution), SeenTorques(*at))
         return self._rippled[1]
 
     def _space(self, parent: CellFit, seed: Mapping[str, float]) -> Space:
@@ -304,4 +264,4 @@ class CellFitter:
         left = errors * self.weights.weight(variance)
         ended = replace(solution, residuals=left, jacobian=known, cost=float(left @ left))
         model = space.model(x)
-        return CellFit(effects, space, model, ended, variance, self._left(model, variance))
+        return CellFit(effects, space, model, ended, variance, self.left_by(model, variance))

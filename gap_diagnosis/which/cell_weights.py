@@ -23,9 +23,11 @@ class CellWeights:
 
     Attributes:
         fit_parts, select_parts: indices of parts.
+        floor: (cells,), least variance of an error of the fit, rad2.
         runs: (errors,), the record of each error of the fit.
         counts: (parts, bands), lines of each part that selects.
         select_floor: (parts, bands), least variance of an error there, rad2.
+        select_levels: (parts,), index of the level of each.
         unseen: bool (errors that select,) of each run that no fit sees.
     """
 
@@ -43,7 +45,7 @@ class CellWeights:
         self._alone = np.array([runs.count(level) == 1 for level in levels])
         self._coherent = np.full((len(levels), evidence.bands), LEAST_INDEPENDENT)
         self._noise = evidence.noise_power
-        self._floor = evidence.floor(self.fit_parts)
+        self.floor = evidence.floor(self.fit_parts)
         of_part = np.array([part.record for part in evidence.parts])
         self.runs = of_part[evidence.part_of(self.fit_parts)]
         self._select_cell = evidence.cell_of(self.select_parts)
@@ -55,10 +57,10 @@ class CellWeights:
         )
         shape = len(self.select_parts), evidence.bands
         self.counts = np.bincount(self._select_bins, minlength=shape[0] * shape[1]).reshape(shape)
-        self._select_levels = np.array(
+        self.select_levels = np.array(
             [of_level(evidence.parts[p].level) for p in self.select_parts]
         )
-        self.select_floor = self._floor.reshape(-1, evidence.bands)[self._select_levels]
+        self.select_floor = self.floor.reshape(-1, evidence.bands)[self.select_levels]
         unseen = np.setdiff1d(of_part[parts], self.runs)
         self.unseen = [of_part[parts] == run for run in unseen]
 
@@ -109,7 +111,7 @@ class CellWeights:
         """
         known = self._noise[: self._evidence.bands]
         noise = np.minimum(known / np.minimum(before, after), 1.0)
-        coherent = np.minimum(self._coherent[self._select_levels], self.counts)
+        coherent = np.minimum(self._coherent[self.select_levels], self.counts)
         numbers = independent(noise, self.counts, coherent)
         return 0.5 * numbers * np.log(before / after)
 
@@ -151,7 +153,7 @@ class CellWeights:
         Returns:
             (models,).
         """
-        cells, least = self._evidence.cells, self._floor / variance
+        cells, least = self._evidence.cells, self.floor / variance
         numbers = self.numbers(variance)
         squares = np.array([np.bincount(self._cell, row**2, cells) for row in errors])
         mean = np.maximum(squares / np.maximum(numbers, 1e-9), least)
@@ -160,7 +162,7 @@ class CellWeights:
     def variance(self, errors: np.ndarray) -> np.ndarray:
         """Return the variance of an error in each cell that a fit leaves, (cells,), rad2."""
         found = self._evidence.mean_squares(errors, self.fit_parts)
-        return np.maximum(found, self._floor)
+        return np.maximum(found, self.floor)
 
 
 def independent(noise: np.ndarray, lines: np.ndarray, coherent: np.ndarray) -> np.ndarray:

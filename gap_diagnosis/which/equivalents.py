@@ -1,14 +1,10 @@
-"""Effects that may stand in for each other, and those that only scale the base parameters."""
+"""Effects that may stand in for each other."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 
 from fjr_sim_node import effects as fx
-
-SCALES = tuple(effect.identifier for effect in fx.CATALOGUE if effect.scales)
-"""Effects that scale the base parameters: a gain of the torque does nothing else, and is no second
-cause whatever it gains; an eccentric encoder has a gain about its zero, and may do more."""
 
 ONE_CAUSE = 0.04
 """Of the gap, beyond noise: where one of two near equivalents leaves no more alone, both together
@@ -59,12 +55,6 @@ def founded(
         return any(nominal.get(p.adds_to) for p in fx.EFFECTS[base].parameters)
 
     return [effect for effect in effects if has_base(effect)]
-
-
-def stands_for(effects: Sequence[str], others: Sequence[str]) -> bool:
-    """Tell whether explanations differ by one effect and a near equivalent of it."""
-    mine, theirs = set(effects) - set(others), set(others) - set(effects)
-    return len(mine) == 1 and bool(partners(sorted(theirs), mine))
 
 
 def plainness(

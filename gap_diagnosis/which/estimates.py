@@ -4,8 +4,7 @@ The Gauss-Newton covariance holds if what the fit leaves is noise. A law of anot
 rig's leaves something that is alike on neighbouring lines, and shifts the parameters by more. The
 group jackknife sees that (Efron, Tibshirani 1993, An Introduction to the Bootstrap, ch. 11): the
 fit is repeated, to first order, without one band of one realization at a time. The wider counts.
-What errs alike in all bands it cannot see: an effect of another form than the catalogue's goes
-into the bare parameters beside it, whose intervals are widened by what blind cases have shown.
+What errs alike in all bands it cannot see.
 """
 
 from __future__ import annotations
@@ -19,49 +18,20 @@ from fjr_sim_node import effects as fx
 
 from ..gates.bag_deviations import SCATTERING
 from ..outcome.diagnosis import Bags, Estimate
-from .cell_fits import CellFit
-from .fits import Fit
+from .comparison import CellFit
 
-WIDENING: tuple[float, ...] = (1.0, 1.27, 1.92)
-"""Factor on the standard errors of the bare parameters in a fit with no effect, one, and more.
-
-From the blind cases of `confidence`: 456, 776 and 216 parameters.
-"""
 FORM = 0.01
-"""Standard deviation of an effect's parameters by the form of its law, relative, in steady periods:
-no law of a catalogue is quite the rig's. By what 139 parameters of the blind check of seed 306
-showed."""
+"""Standard deviation of an effect's parameters by the form of its law, relative, where noise
+explains what it leaves: no law of a catalogue is quite the rig's. By what 139 parameters of the
+blind check of seed 306 showed."""
 FORM_BESIDE = 0.03
-"""The same beside a remainder; 72 parameters of that check."""
+"""The same beside a remainder; by 72 parameters of that check."""
 _LEFT_TO_OTHERS = 0.01
 """Of what is known of a parameter: where the others hold less, one group holds nearly all."""
-_NORMAL_95 = 1.96
+NORMAL_95 = 1.96
 
 
-def estimates(fit: Fit, groups: np.ndarray, moved: np.ndarray | float = 0.0) -> dict[str, Estimate]:
-    """Return all free parameters of a fit with their 95 % intervals, cut at their bounds.
-
-    A gain of the torque is known only as far as the datasheet is: the data cannot tell it from base
-    parameters that are all scaled, so beside it their tolerance counts as a 95 % interval.
-
-    Args:
-        fit: an explanation.
-        groups: to which group each of its training errors belongs, `Misfit.groups`.
-        moved: what scatters from run to run moves its point, see `moved_by_scatter`.
-    """
-    solution, space = fit.solution, fit.space
-    prior = np.zeros(solution.x.size)
-    if "torque_gain" in fit.effects:
-        prior[: len(space.nominal)] = (_NORMAL_95 / np.log1p(space.tolerance)) ** 2
-    std = standard_errors(solution.jacobian, solution.residuals, groups, prior)
-    std[: len(space.nominal)] *= WIDENING[min(len(fit.effects), len(WIDENING) - 1)]
-    std = np.sqrt(std**2 + np.square(moved) + form(fit, FORM) ** 2)
-    found = linear_estimates(fit, std)
-    fallen = {e: _fall(fit, without) for e, without in fit.without.items() if e in fit.effects}
-    return kept_from_zero(found, fallen)
-
-
-def form(fit: Fit | CellFit, share: float) -> np.ndarray:
+def form(fit: CellFit, share: float) -> np.ndarray:
     """Return the standard deviation of a fit's parameters by the forms of the effects' laws.
 
     Args:
@@ -78,7 +48,7 @@ def form(fit: Fit | CellFit, share: float) -> np.ndarray:
     return share * np.concatenate([np.zeros(own), sizes])
 
 
-def linear_estimates(fit: Fit | CellFit, std: np.ndarray) -> dict[str, Estimate]:
+def linear_estimates(fit: CellFit, std: np.ndarray) -> dict[str, Estimate]:
     """Return all free parameters of a fit with their 95 % intervals, cut at their bounds.
 
     Args:
@@ -87,7 +57,7 @@ def linear_estimates(fit: Fit | CellFit, std: np.ndarray) -> dict[str, Estimate]
     """
     x, space = fit.solution.x, fit.space
     low, high = (
-        space.model(np.clip(x + sign * _NORMAL_95 * std, *space.bounds())) for sign in (-1, 1)
+        space.model(np.clip(x + sign * NORMAL_95 * std, *space.bounds())) for sign in (-1, 1)
     )
     found = {
         name: Estimate(value=fit.model.plant[name], low=low.plant[name], high=high.plant[name])
@@ -117,7 +87,7 @@ def kept_from_zero(
     kept = dict(found)
     for effect, fall in fallen.items():
         sizes = [name for name in fx.EFFECTS[effect].size_names if name in found]
-        if len(sizes) == 1 and fall > _NORMAL_95**2:
+        if len(sizes) == 1 and fall > NORMAL_95**2:
             kept[sizes[0]] = _beside_zero(found[sizes[0]], fall)
     return kept
 
@@ -125,39 +95,10 @@ def kept_from_zero(
 def _beside_zero(linear: Estimate, fall: float) -> Estimate:
     if not linear.low <= 0.0 <= linear.high:
         return linear
-    nearest = linear.value * (1.0 - _NORMAL_95 / np.sqrt(fall))
+    nearest = linear.value * (1.0 - NORMAL_95 / np.sqrt(fall))
     if linear.value > 0.0:
         return linear.model_copy(update={"low": nearest})
     return linear.model_copy(update={"high": nearest})
-
-
-def _fall(fit: Fit, without: float) -> float:
-    """Return an effect's likelihood ratio statistic, the variance being what the fit leaves."""
-    left = max(1.0, fit.train_chi2 / fit.solution.residuals.size)
-    return max(without - fit.train_chi2, 0.0) / left
-
-
-def sure(fit: Fit, groups: np.ndarray) -> bool:
-    """Tell whether every effect of a fit is there.
-
-    The interval of one of its sizes lacks zero; of several that only together are known, such as
-    those of a loss forward and backward, the likelihood ratio tells it.
-
-    Args:
-        fit: an explanation.
-        groups: as for `estimates`.
-    """
-    found = estimates(fit, groups)
-
-    def is_there(effect: str) -> bool:
-        sizes = [name for name in fx.EFFECTS[effect].size_names if name in found]
-        if any(not found[name].low <= 0.0 <= found[name].high for name in sizes):
-            return True
-        if len(sizes) < 2 or effect not in fit.without:
-            return False
-        return together_sure(_fall(fit, fit.without[effect]), len(sizes))
-
-    return all(is_there(effect) for effect in fit.effects)
 
 
 def together_sure(fall: float, sizes: int) -> bool:
@@ -186,9 +127,7 @@ def relative_scatter(bags: Bags | None) -> dict[str, float]:
     }
 
 
-def moved_by_scatter(
-    fit: Fit | CellFit, runs: np.ndarray, scatter: Mapping[str, float]
-) -> np.ndarray:
+def moved_by_scatter(fit: CellFit, runs: np.ndarray, scatter: Mapping[str, float]) -> np.ndarray:
     """Return how far parameters that scatter from run to run move the point of a fit.
 
     A fit to a few runs knows what these runs have in common. Each scattering parameter deviates in
@@ -216,7 +155,7 @@ def moved_by_scatter(
     return np.sqrt(variance)
 
 
-def deviations(fit: Fit | CellFit, scatter: Mapping[str, float]) -> np.ndarray:
+def deviations(fit: CellFit, scatter: Mapping[str, float]) -> np.ndarray:
     """Return the standard deviation from run to run of each parameter of a fit.
 
     Args:

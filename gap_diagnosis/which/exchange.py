@@ -32,7 +32,7 @@ def replace_bounded(found: Found, fitter: CellFitter, extension: Extension) -> N
         free = [f for f in fits if not at_its_bound(f, f.effects[-1])]
         other = extension.chosen(free, without)
         worth = extension.gain(best, without).mean
-        if other is None or not stands_for(extension.gain(best, other), worth):
+        if other is None or not stands_for(fitter, other, best, worth):
             continue
         before = [fit for fit in found.steps if effect not in fit.effects]
         found.alternatives[other.effects[-1]] = extension.tied(other, fits, without)

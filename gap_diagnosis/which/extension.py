@@ -4,21 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
+import numpy as np
+
 from fjr_sim_node import effects as fx
 
-from .cell_fits import CellFit, CellFitter
+from .cell_fits import CellFitter
+from .comparison import NOTHING_LEFT, CellFit
 from .equivalents import ONE_CAUSE, founded, holders, partners, plainness
 from .gains import Gain, gain, left_of, stands_for
-from .harmonics import with_second_harmonic
+from .harmonics import WORTH_A_HARMONIC, with_second_harmonic
 from .screening import Proposal, Screening
 
 _PROPOSED, _FITTED, _STARTS = (7, 5), (5, 3), (2, 1)
 """Effects that are tried at several sizes, those of them that are fitted, and from how many starts:
 beside no cause yet, beside others."""
 _POLISHED = 2  # leading fits of a step that are taken further
-_WORTH_A_HARMONIC = 1.3  # a misfit: what noise leaves is no second harmonic
 _AGAIN = 8  # effects that are screened beside a cause, and those that depend on others
 _OUTDATED = 0.1  # of the squared error that is left: then what was screened before is too far
+_NEARLY_ALL, _MOST = 0.1, 0.5
+"""Of the squared error: what a fit leaves that closes nearly all, and one that leaves most."""
 _MUCH_LESS = 0.3  # of the greatest gain: a cause that gains less waits for the next step
 _START_LESS = 0.2  # of the greatest gain of a start: an effect whose best one gains less waits
 
@@ -81,22 +85,26 @@ class Extension:
         fits = self.ranked(fits, parent)
         first = [fit.effects[-1] for fit in fits[:_POLISHED]]
         near = len(partners(first[:1], set(first))) > 1
-        leading = [self._enriched(self._settled(f, parent, near)) for f in fits[:_POLISHED]]
+        leading = [self._enriched(self._settled(f, parent, near), parent) for f in fits[:_POLISHED]]
         return self.ranked([*leading, *fits[_POLISHED:]], parent)
 
     def tied(self, chosen: CellFit, fits: Sequence[CellFit], parent: CellFit) -> list[str]:
         """Return the effects that unseen parts cannot tell from the chosen one."""
         first = self.gain(chosen, parent).mean
         others = [f for f in fits if f is not chosen and f.effects[:-1] == chosen.effects[:-1]]
-        return [f.effects[-1] for f in others if stands_for(self.gain(chosen, f), first)]
+        return [f.effects[-1] for f in others if stands_for(self._fitter, f, chosen, first)]
 
     def chosen(self, fits: Sequence[CellFit], parent: CellFit) -> CellFit | None:
         """Return the best fit whose gain repeats, unless another one gains much more.
+
+        What closes nearly all of the squared error goes before what gains more in many bands but
+        leaves most of it: a constant torque, say, moves the angle over which others ripple.
 
         Of those that unseen parts cannot tell from it, one that holds no other as a limit case, the
         one with the fewest parameters, and then the commoner one.
         """
         gains = [gain(self._fitter, fit, parent, fit.acts) for fit in fits]
+        present = [fit for fit, found in zip(fits, gains, strict=True) if found.present]
         repeating = [
             fit
             for fit, found in zip(fits, gains, strict=True)
@@ -104,9 +112,13 @@ class Extension:
         ]
         if not repeating:
             return None
+        left = [left_of(self._fitter, fit, parent) for fit in present]
+        nearly_all = present[int(np.argmin(left))]
+        if min(left) < _NEARLY_ALL and left_of(self._fitter, repeating[0], parent) > _MOST:
+            return nearly_all
         first = repeating[0]
         worth = self.gain(first, parent).mean
-        alike = [f for f in repeating if f is first or stands_for(self.gain(first, f), worth)]
+        alike = [f for f in repeating if f is first or stands_for(self._fitter, f, first, worth)]
         laws = [fit.effects for fit in alike]
         return min(alike, key=lambda fit: plainness(fit.effects, fit.space.effects, laws))
 
@@ -145,18 +157,18 @@ class Extension:
         if fit.solution.converged and closes_little and not alike:
             return fit
         self._progress(f"{' + '.join(fit.effects)}, further")
-        return self._fitter.further(fit)
+        return self._fitter.to_its_end(fit)
 
-    def _enriched(self, fit: CellFit) -> CellFit:
+    def _enriched(self, fit: CellFit, parent: CellFit) -> CellFit:
         """Return a fit whose last effect is a ripple with its second harmonic, if that repeats.
 
         A ripple of two harmonics that is taken for one leaves what looks like a further cause.
         """
         effect = fit.effects[-1]
-        if not fx.EFFECTS[effect].ripple or self._fitter.misfit(fit) < _WORTH_A_HARMONIC:
+        if not fx.EFFECTS[effect].ripple or self._fitter.misfit(fit) < WORTH_A_HARMONIC:
             return fit
         self._progress(f"{' + '.join(fit.effects)}, second harmonic")
-        richer = with_second_harmonic(self._fitter, fit, effect)
+        richer = with_second_harmonic(self._fitter, fit, parent)
         if richer is None or not self.gain(richer, fit).present:
             return fit
         # both by the weights of what they leave themselves
@@ -164,9 +176,20 @@ class Extension:
         return richer if self.gain(richer, alone).present else alone
 
     def _one_cause(self, parent: CellFit, refit: CellFit) -> list[str]:
-        """Return what could only name a cause of the parent twice; see `ONE_CAUSE`."""
+        """Return what could only name a cause of the parent twice; see `ONE_CAUSE`.
+
+        Not where a band is left in which the parent closes little: there another cause acts.
+        """
         left, gap = self._fitter.misfit(parent) - 1.0, self._fitter.misfit(refit) - 1.0
-        return partners(parent.effects, set(self.effects)) if left < ONE_CAUSE * gap else []
+        if not left < ONE_CAUSE * gap:
+            return []
+        weights = self._fitter.weights
+        over = [fit.left / weights.select_floor - 1.0 for fit in (parent, refit)]
+        bands = [
+            np.sum(weights.counts * each, axis=0) / weights.counts.sum(axis=0) for each in over
+        ]
+        open_bands = (bands[0] > NOTHING_LEFT) & (bands[0] > _MOST * bands[1])
+        return [] if open_bands.any() else partners(parent.effects, set(self.effects))
 
     def screened(self, parent: CellFit, effects: Sequence[str]) -> dict[str, Screening]:
         """Return screenings beside a fit: of all effects the first time, then of those that count.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from .cell_fits import CellFit
+from .comparison import CellFit
 
 
 @dataclass

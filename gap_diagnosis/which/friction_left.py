@@ -7,7 +7,8 @@ import numpy as np
 from fjr_sim_node import effects as fx
 
 from ..where.remainder import share_of_velocity
-from .cell_fits import CellFit, CellFitter
+from .cell_fits import CellFitter
+from .comparison import CellFit
 
 FRICTION = tuple(effect.identifier for effect in fx.FRICTION)
 """Effects that are laws of friction."""

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
-from .cell_fits import CellFit, CellFitter
+from .cell_fits import CellFitter
+from .comparison import CellFit
 
 LEAST_GAIN = 1.0
 """Least mean gain of log-likelihood of an unseen part (nats)."""
@@ -17,6 +18,8 @@ MOST_P = 0.05
 """Greatest p-value of the signed-rank test that parts gain as often and as much as they lose."""
 TIED_SHARE = 0.15
 """An effect stands for another if it is behind by less than this share of the other's gain..."""
+TOLD_APART = 2.0
+"""How many times as much over noise an explanation must leave to be told from another for that."""
 TIED_P = 0.1
 """...or by less than half of it and unseen parts do not show the difference."""
 
@@ -126,13 +129,27 @@ def _p_value(gains: np.ndarray) -> float:
     return float(np.exp(-np.minimum(gains, _COUNTED).sum()))
 
 
-def stands_for(behind: Gain, first: float) -> bool:
+def stands_for(
+    fitter: CellFitter, other: CellFit, best: CellFit, first: float, near: bool = False
+) -> bool:
     """Tell whether unseen parts cannot tell an explanation from a better one.
 
+    They do where it is far behind, and where what it leaves over noise is twice as much in nearly
+    all of them: of a cause that closes nearly all of a gap, every other one is little behind.
+
     Args:
-        behind: what the better one gains over it.
+        fitter: that made both.
+        other: the explanation.
+        best: the better one.
         first: mean gain of the better one's cause.
+        near: whether it is a near equivalent, which must be told as surely as a cause is shown.
     """
+    behind = gain(fitter, best, other)
+    if near and not behind.present:
+        return True
+    left, least = fitter.misfit(other) - 1.0, max(fitter.misfit(best) - 1.0, 1.0)
+    if behind.present and left > TOLD_APART * least:
+        return False
     if behind.mean < TIED_SHARE * first:
         return True
     return behind.p > TIED_P and behind.mean < 0.5 * first

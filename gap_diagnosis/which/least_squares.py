@@ -22,6 +22,7 @@ _DAMPINGS = np.array([1.0, 1e2])  # tried one after the other, times the present
 _LEAST_DAMPING, _MOST_DAMPING = 1e-7, 1e6
 _FRESH_DAMPING, _MUCH_DAMPING = 1.0, 1e2  # first tried with a fresh Jacobian; small steps beyond
 _SMALL_GAIN = 1e-3
+_PROMISED = 0.05  # of the cost: what a linear model may still promise where a fit has converged
 _GOOD, _POOR = 0.7, 0.3  # gain over the gain that the linear model promises
 _PATIENCE, _STILL_FALLING = 3, 0.8
 _MOST_UPDATES = 4  # of one Jacobian
@@ -146,7 +147,7 @@ class _Search:
         gained = self.cost - cost
         self.fresh = fresh = self._updates == 0
         self._small = self._small + 1 if gained < _SMALL_GAIN * self.cost else 0
-        self.converged = self._small >= 2 and fresh
+        self.converged = self._small >= 2 and fresh and not self._promises()
         ratio = gained / promised if promised > 0.0 else 0.0
         factor = 0.1 if ratio > _GOOD else 1.0 if ratio > _POOR else 10.0
         self._damping = float(np.clip(factor * damping, _LEAST_DAMPING, _MOST_DAMPING))
@@ -156,6 +157,14 @@ class _Search:
             self._updates = None if stale else (self._updates or 0) + 1
         self.x, self.r, self.cost = x, r, cost
         self.steps += 1
+
+    def _promises(self) -> bool:
+        """Tell whether a step without damping would gain much, were the errors linear.
+
+        Along a valley that bends, steps are short and each gains next to nothing.
+        """
+        linear = self.r + self.jacobian @ (self._trial(_LEAST_DAMPING) - self.x)
+        return self.cost - float(linear @ linear) > _PROMISED * self.cost
 
     def _differentiate(self) -> None:
         """Take one-sided finite differences, stepping away from a bound; known columns are free."""

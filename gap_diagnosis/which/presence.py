@@ -18,9 +18,12 @@ from fjr_sim_node import effects as fx
 
 from ..model.rig_model import Model
 from ..outcome.diagnosis import Estimate
-from .cell_fits import CellFit, CellFitter
+from .cell_fits import CellFitter
+from .comparison import NOTHING_LEFT, CellFit
 from .estimates import (
+    FORM,
     FORM_BESIDE,
+    NORMAL_95,
     deviations,
     form,
     kept_from_zero,
@@ -29,7 +32,6 @@ from .estimates import (
     standard_errors,
     together_sure,
 )
-from .fits import Fit
 from .gains import fall
 
 LEAST_INVARIANCE_P = 0.01
@@ -45,6 +47,9 @@ def cell_estimates(
 ) -> dict[str, Estimate]:
     """Return all free parameters with their 95 % intervals, cut at their bounds.
 
+    A gain of the torque is known only as far as the datasheet is: the data cannot tell it from base
+    parameters that are all scaled, so beside it their tolerance counts as a 95 % interval.
+
     A size that the shape of an only effect blurs is kept from zero by its profile; of several
     effects one may blur the other, and then it is not known which of them is there.
 
@@ -54,9 +59,14 @@ def cell_estimates(
         scatter: standard deviations of parameters from run to run, see `moved_by_scatter`.
         without: the fits that lack one of its effects, by that.
     """
-    std = standard_errors(fit.solution.jacobian, fit.solution.residuals, fitter.groups)
+    space, solution = fit.space, fit.solution
+    prior = np.zeros(solution.x.size)
+    if "torque_gain" in fit.effects:
+        prior[: len(space.nominal)] = (NORMAL_95 / np.log1p(space.tolerance)) ** 2
+    std = standard_errors(solution.jacobian, solution.residuals, fitter.groups, prior)
     moved = moved_by_scatter(fit, fitter.runs, scatter)
-    linear = linear_estimates(fit, np.sqrt(std**2 + moved**2 + form(fit, FORM_BESIDE) ** 2))
+    share = FORM if fitter.misfit(fit) < NOTHING_LEFT else FORM_BESIDE
+    linear = linear_estimates(fit, np.sqrt(std**2 + moved**2 + form(fit, share) ** 2))
     if len(fit.effects) > 1:
         return linear
     return kept_from_zero(linear, {e: fall(fitter, fit, other) for e, other in without.items()})
@@ -83,7 +93,7 @@ def beyond_zero(effect: str, found: Mapping[str, Estimate], fall: float) -> bool
     return len(sizes) > 1 and together_sure(fall, len(sizes))
 
 
-def at_its_bound(fit: CellFit | Fit, effect: str) -> bool:
+def at_its_bound(fit: CellFit, effect: str) -> bool:
     """Tell whether a parameter of an effect lies where the fit may go no further.
 
     Zero and one are no such bounds: they are what a ratio or a share can be.

@@ -1,9 +1,9 @@
-"""Ripples over the motor angle that could explain a model's remainder: hundreds tried at once.
+"""Ripples over the motor angle that could explain what a fit leaves of records.
 
-A ripple acts as a torque on the motor. What it does to the position is predicted linearly: the
-torque along the model's own motion, times the response of the closed loop to a torque,
-Y/(R C) = G/(1 + G C), which the model's simulation gives at the excited lines. Only the best go on
-to be simulated, so that this may be rough.
+A ripple acts as a torque along the model's own motion. What it does to the position is predicted
+linearly, by the response of plant and controller (or observer), G/(1 + G C_y); so hundreds of
+numbers of ripples can be tried at once, and only the best are simulated. The torque is made at each
+sample and then averaged over as many as the lines of the evidence allow.
 """
 
 from __future__ import annotations
@@ -11,138 +11,178 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
+from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
-from controller_node.law import as_transfer_function, law_of
-from fjr_records.periodic import RecordedExperiment
-from fjr_records.spectra import line_spectrum
 from fjr_sim_node import effects as fx
+from fjr_sim_node.theory.linear import g0
 
-from ..model.misfit import Misfit
+from ..model.evidence import Evidence
 from ..model.rig_model import Model
-from ..model.simulated_rig import Simulator
 from .least_squares import Solution
 
-
-@dataclass(frozen=True)
-class _Motion:
-    """One period of a model's motion, (realizations, N) each, and the loop's response to torque.
-
-    Attributes:
-        motor: rad.
-        velocity, torque, transmitted: rad/s, N m, N m, in single precision.
-        response: complex (realizations, lines), position per torque on the motor, rad/(N m).
-        both: the same of a torque between link and motor.
-    """
-
-    motor: np.ndarray
-    velocity: np.ndarray
-    torque: np.ndarray
-    transmitted: np.ndarray
-    response: np.ndarray
-    both: np.ndarray
+MOST_TRIED = 240
+_LEAST_FIRST = 0.1  # of the second harmonic: a smaller first one is no ripple of that number
+_FREE_HZ = 1e-3  # below, a free body has no response
+_LEAST_RATE = 8  # samples in a period of the highest line: averaging takes off 3 % there
 
 
-class RippleSearch:
-    """What ripples of one effect could do about the errors that a fit leaves."""
+class Ripples:
+    """What ripples could do about the errors that a fit leaves."""
 
     def __init__(
         self,
-        effect: str,
-        recorded: RecordedExperiment,
-        simulator: Simulator,
-        misfit: Misfit,
+        evidence: Evidence,
+        parts: Sequence[int],
         model: Model,
+        weight: np.ndarray,
         parent: Solution,
-        tried: np.ndarray,
     ) -> None:
         """Simulate the model's motion once.
 
         Args:
-            effect: identifier of an effect that is periodic in the motor angle.
-            recorded: the experiment; its loop can be repeated.
-            simulator: repeats it.
-            misfit: of the realizations that count.
+            evidence: the records.
+            parts: that are fitted.
             model: the parent's model.
+            weight: (errors,), one over the standard deviation of each error.
             parent: where the parent's fit ended.
-            tried: numbers of ripples per turn to look at, float64 (n,), ascending; between them
-                the response hardly changes.
         """
-        self._effect, self._misfit, self._plant = effect, misfit, model.plant
-        self._tried = tried
-        self._motion = _motion(recorded, simulator, misfit, model)
+        self._evidence, self._parts, self._weight = evidence, tuple(parts), weight
+        self._runs = sorted({evidence.parts[i].record for i in parts})
+        motion = evidence.simulator.run([model], self._runs)[0]
+        self._motor = [run[0] for run in motion]
+        self._torque = [run[1].astype(np.float32) for run in motion]
+        self._twist = [(run[2] - run[0]).astype(np.float32) for run in motion]
+        self._direction = [np.sign(np.gradient(run[0])).astype(np.float32) for run in motion]
+        self._every = _averaged(evidence.hop, evidence.lines)
+        self._responses = [self._response(model, index, run.size // self._every) for index, run
+                           in zip(self._runs, self._motor, strict=True)]  # fmt: skip
         self._basis = np.linalg.qr(parent.jacobian)[0]
         self._left = self._beyond(parent.residuals)
+        self._stiffness = model.plant.get("k0", 0.0)
 
-    def cycles(self, most: int) -> list[float]:
+    def cycles(self, effect: str, tried: np.ndarray, most: int) -> list[float]:
         """Return the numbers of cycles per turn that promise most, best first.
 
         Args:
+            effect: identifier of an effect that is periodic in the motor angle.
+            tried: numbers to try, ascending; thinned out to `MOST_TRIED`.
             most: how many to return, each a maximum of its own.
         """
-        gains = np.array([self._best_sizes((cycles,))[1] for cycles in self._tried.tolist()])
-        return [float(self._tried[i]) for i in _peaks(gains)[:most]]
+        tried = _thinned(tried)
+        gains = np.array([self._fitted(effect, (float(cycles),))[1] for cycles in tried])
+        return [float(tried[i]) for i in _peaks(gains)[:most]]
 
-    def harmonics(self, most: int) -> list[tuple[float, float, float, float, float]]:
+    def harmonics(self, effect: str, tried: np.ndarray, most: int) -> list[dict[str, float]]:
         """Return the ripples with a second harmonic that promise most, best first.
 
+        Args:
+            effect: identifier of an effect that is periodic in the motor angle.
+            tried: numbers to try, ascending; thinned out to `MOST_TRIED`.
+            most: how many to return, each a maximum of its own.
+
         Returns:
-            (size, cycles per turn, phase (rad), second harmonic over the first, its phase (rad)),
-            at the most `most`.
+            values by the names of the effect's parameters.
         """
-        tried = [self._best_sizes((cycles, 2.0 * cycles)) for cycles in self._tried.tolist()]
+        tried = _thinned(tried)
+        fits = [self._fitted(effect, (float(c), 2.0 * float(c))) for c in tried]
+        names = fx.EFFECTS[effect].names
         found = []
-        for i in _peaks(np.array([gain for _, gain in tried]))[:most]:
-            weights = tried[i][0]
-            first, second = complex(*weights[:2]), complex(*weights[2:])
-            phase, size = cmath.phase(first), max(abs(first), 0.1 * abs(second))
+        for i in _peaks(np.array([gain for _, gain in fits]))[:most]:
+            sizes = fits[i][0]
+            first, second = complex(*sizes[:2]), complex(*sizes[2:])
+            phase, size = cmath.phase(first), max(abs(first), _LEAST_FIRST * abs(second))
             bend = math.remainder(cmath.phase(second) - 2.0 * phase, 2.0 * math.pi)
-            found.append((size, float(self._tried[i]), phase, abs(second) / size, bend))
+            values = (size, float(tried[i]), phase, abs(second) / size, bend)
+            found.append(dict(zip(names, values, strict=True)))
         return found
 
-    def _best_sizes(self, cycles: Sequence[float]) -> tuple[np.ndarray, float]:
-        """Return sizes of sine and cosine of each number of cycles, and the chi-square's fall."""
-        changes = [_of_ripple(self._effect, n, self._motion, self._plant) for n in cycles]
-        own = self._beyond(self._misfit.errors_of(np.concatenate(changes)))
-        weights = np.linalg.lstsq(own.T, -self._left, rcond=1e-6)[0]
-        return weights, -float(weights @ (own @ self._left))
+    def _fitted(self, effect: str, cycles: Sequence[float]) -> tuple[np.ndarray, float]:
+        """Return sizes of sine and cosine of each number of cycles, and the fall of the cost."""
+        own = []
+        for number in cycles:
+            moved = [
+                self._moved(k, self._torques(effect, k, number)) for k in range(len(self._runs))
+            ]
+            for quarter in (0, 1):
+                changes = {i: pair[quarter] for i, pair in zip(self._runs, moved, strict=True)}
+                column = self._evidence.changes(changes, self._parts, self._every)
+                own.append(self._beyond(column * self._weight))
+        columns = np.array(own)
+        sizes = np.linalg.lstsq(columns.T, -self._left, rcond=1e-6)[0]
+        return sizes, -float(sizes @ (columns @ self._left))
+
+    def _torques(self, effect: str, k: int, cycles: float) -> np.ndarray:
+        """Return the torques by ripples of size 1 along the motion.
+
+        Returns:
+            (2, N) on the motor; (4, N) where the link feels torques too: the last two act between
+            link and motor.
+        """
+        turns = waves(cycles, self._motor[k])
+        acts_on = fx.EFFECTS[effect].acts_on
+        if acts_on == "motor":
+            return -turns * self._direction[k]
+        if acts_on == "transmission":
+            slopes = np.float32(cycles) * np.array([turns[1], -turns[0]])
+            return np.float32(self._stiffness) * np.concatenate([-slopes * self._twist[k], turns])
+        if not fx.EFFECTS[effect].full_parameters[0].unit:  # a share of the torque, not a torque
+            return turns * self._torque[k]
+        return turns
+
+    def _moved(self, k: int, torques: np.ndarray) -> np.ndarray:
+        """Return the changes of the position by `_torques`, averaged, (2, N // every)."""
+        count, samples = len(torques), torques.shape[1] // self._every
+        blocks = torques[:, : samples * self._every].reshape(count, samples, self._every)
+        averaged = blocks @ np.full(self._every, 1.0 / self._every, np.float32)
+        response, size = self._responses[k], 2 * (self._responses[k].shape[1] - 1)
+        spectra = rfft(averaged, size).reshape(-1, 2, response.shape[1])
+        moved = np.einsum("fnl,fl->nl", spectra, response[: len(spectra)])
+        return irfft(moved, size)[:, :samples]
+
+    def _response(self, model: Model, index: int, samples: int) -> np.ndarray:
+        """Return position per torque on the motor, and per torque between link and motor.
+
+        Returns:
+            complex (2, lines), at the lines of a padded record.
+        """
+        size = 2 * next_fast_len(samples, real=True)
+        rate = self._evidence.records.sample_rate_hz
+        frequency = np.maximum(rfftfreq(size, self._every / rate), _FREE_HZ)
+        plant_response = g0(model.whole_plant, frequency, rate)
+        holds = np.nan_to_num(self._evidence.simulator.response(frequency, index))
+        response = plant_response / (1.0 + plant_response * holds)
+        pair = np.array([np.ones(frequency.size), of_pair(model.plant, frequency)])
+        return (response * pair).astype(np.complex64)
 
     def _beyond(self, errors: np.ndarray) -> np.ndarray:
-        """Return what the parent's parameters can't follow of error vectors (..., errors)."""
-        return errors - (errors @ self._basis) @ self._basis.T
+        """Return what the parent's parameters can't follow of errors, (errors,)."""
+        return errors - self._basis @ (self._basis.T @ errors)
+
+
+def _thinned(tried: np.ndarray) -> np.ndarray:
+    if len(tried) <= MOST_TRIED:
+        return tried
+    return tried[np.unique(np.linspace(0, len(tried) - 1, MOST_TRIED).astype(int))]
 
 
 def _peaks(gains: np.ndarray) -> np.ndarray:
     """Return the indices of the maxima, greatest first."""
     padded = np.concatenate([[-1.0], gains, [-1.0]])
     peaks = np.flatnonzero((gains >= padded[:-2]) & (gains > padded[2:]))
-    return peaks[np.argsort(-gains[peaks])]
+    return np.asarray(peaks[np.argsort(-gains[peaks])])
 
 
-def _motion(
-    recorded: RecordedExperiment, simulator: Simulator, misfit: Misfit, model: Model
-) -> _Motion:
-    description = recorded.experiment
-    y, u, q = simulator.motion(model, misfit.which)
-    lines = np.arange(recorded.lines)
-    excited = np.array(description.excited_harmonics)
-    rate = description.sample_rate_hz
-    law = as_transfer_function(law_of(description.controller, rate))
-    forward, _ = law.response(lines * description.base_frequency_hz, rate)
-    r = [recorded.realizations[i].played[-1] for i in misfit.which]
-    loop = line_spectrum(y, lines.size) / (line_spectrum(np.array(r), lines.size) + 1e-300)
-    response = np.array([_between(lines, excited, row[excited]) for row in loop]) / forward
-    p, twist = model.plant, q - y
-    return _Motion(
-        motor=y,
-        velocity=(np.gradient(y, axis=1) * description.sample_rate_hz).astype(np.float32),
-        torque=u.astype(np.float32),
-        transmitted=(p.get("k0", 0.0) * twist).astype(np.float32),
-        response=response,
-        both=response * of_pair(p, lines * description.base_frequency_hz),
-    )
+def _averaged(hop: int, lines: int) -> int:
+    """Return over how many samples a signal may be averaged whose lines above `lines` don't count.
+
+    Args:
+        hop: of the lapped transform, samples; still an even number of averages.
+        lines: that count.
+    """
+    most = max(2 * hop // (_LEAST_RATE * lines), 1)
+    return next(every for every in range(most, 0, -1) if hop % (2 * every) == 0)
 
 
 def waves(cycles: float, angle: np.ndarray) -> np.ndarray:
@@ -167,29 +207,3 @@ def of_pair(p: Mapping[str, float], frequency_hz: np.ndarray) -> np.ndarray:
     s = 2j * np.pi * frequency_hz
     free = p["j"] * s**2 + p["fv"] * s
     return free / (free + p["k0"])
-
-
-def _between(lines: np.ndarray, known: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Interpolate a response in magnitude and phase."""
-    size = np.interp(lines, known, np.log(np.abs(values)))
-    return np.exp(size + 1j * np.interp(lines, known, np.unwrap(np.angle(values))))
-
-
-def _of_ripple(
-    effect: str, cycles: float, motion: _Motion, plant: Mapping[str, float]
-) -> np.ndarray:
-    """Return the changes by the sine and the cosine of a ripple of size 1."""
-    turns = waves(cycles, motion.motor)
-    lines = motion.response.shape[-1]
-    acts_on = fx.EFFECTS[effect].acts_on
-    if acts_on == "motor":
-        changes = line_spectrum(-turns * np.sign(motion.velocity), lines) * motion.response
-    elif acts_on == "drive":
-        if not fx.EFFECTS[effect].full_parameters[0].unit:  # a share of the torque, not a torque
-            turns = turns * motion.torque
-        changes = line_spectrum(turns, lines) * motion.response
-    else:
-        slopes = np.float32(cycles) * np.array([turns[1], -turns[0]])
-        changes = line_spectrum(turns, lines) * plant["k0"] * motion.both
-        changes -= line_spectrum(slopes * motion.transmitted, lines) * motion.response
-    return changes

@@ -29,6 +29,11 @@ def ripples_passed(model: Model, effect: str, scales: Scales) -> float:
     return model.effects[f"{effect}.cycles_per_turn"] * scales.travel_rad / (2.0 * math.pi)
 
 
+def fewest_cycles(scales: Scales) -> float:
+    """Return the cycles per turn of which the motion passes enough to see a second harmonic."""
+    return LEAST_PASSED * 2.0 * math.pi / scales.travel_rad
+
+
 def doubt_of_shape(passed: float, bounded: bool = False) -> float:
     """Return the factor of the presence of an effect by what is seen of its shape.
 

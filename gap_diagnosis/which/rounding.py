@@ -1,48 +1,44 @@
-"""An encoder that counts in coarse steps: seen in the record itself, and judged as noise.
+"""An encoder that counts in coarse steps: seen in the records themselves, and played in the loop.
 
-All recorded positions are then multiples of one step, which no fit has to find. In the loop the
-rounding decides chaotically which count comes next: it repeats with the periods, so that their
-scatter does not show it, but no simulation meets it sample by sample. So it widens the variance of
-the lines, step^2/12 a sample, and is named where the refit, or the effects beside it, leave nothing
-but that.
-
-A motion that takes many samples for a count has errors that are no white noise: they go with the
-motion, and move it in the mean by several times as much. Simulations that round, each with noise of
-its own, show both.
+All recorded positions are then multiples of one step, which no fit has to find. Where the motion
+passes many counts, what is rounded away is white noise of variance step^2/12, as `record_noise`
+says. A motion that takes many samples for a count has errors that are no white noise: they go with
+the motion, and move it in the mean by several times as much. In the loop the rounding decides
+chaotically which count comes next, so that no simulation meets it sample by sample; simulations
+that round, each with noise of its own, show how far it moves the motion and how far it scatters.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
 
-from fjr_records.periodic import RecordedExperiment
-from fjr_records.spectra import line_spectrum
-
-from ..model.misfit import Misfit
+from ..model.evidence import Evidence
+from ..model.lapped import lapped
 from ..model.rig_model import Model
-from ..model.simulated_rig import Simulator, run_parallel
+from ..model.simulated_rig import run_parallel
 from ..outcome.verdict_words import ROUNDING
-from .attribution import CERTAIN, PLAIN, SECOND_GAIN, SMALL_GAIN, Attribution
-from .fits import Fit
+from .cell_fits import CellFitter
+from .comparison import NOTHING_LEFT, CellFit
+from .found import Found
 
+Progress = Callable[[str], None]
+
+STEP = f"{ROUNDING}.resolution_rad"
+"""Name of the step of the encoder."""
 _FEW_COUNTS = 30.0
 """Of the rms motion: rounding that is finer acts as white noise."""
-_SIMULATED = 8  # simulations of each realization that round
-_ALIKE = 9  # neighbouring lines that rounding scatters alike
+_ROUNDS = 3  # of simulating what rounding adds to the best fit, and fitting it anew
+_NEAR = 4.0
+"""Misfit by noise and rounding above which a model misses so much that it cannot say what rounding
+adds: two standard deviations of rounding, more than half a step."""
+_SIMULATED = 8  # simulations of each run that round
 _DITHER = 0.05  # of a step: noise that makes the simulations take other counts
-
-
-def widened(noise_std: np.ndarray, step: float, samples: int) -> np.ndarray:
-    """Return the noise of the lines of y with that of rounding, as `NoiseLevels.of_outputs`."""
-    out = noise_std.copy()
-    rounding = np.full(noise_std.shape[-1], step / np.sqrt(3.0 * samples))
-    rounding[0] *= 0.5
-    out[:, 0] = np.hypot(out[:, 0], rounding)
-    return out
+_OFF_GRID = 0.01  # of a step: counts of the simulator are multiples of it
 
 
 @dataclass(frozen=True)
@@ -50,99 +46,125 @@ class Rounded:
     """What rounding does to the motion of a model in its loop.
 
     Attributes:
-        added: on the average, to y, u and q, float64 (realizations, 3, N).
-        std: how far it scatters about that average, by the lines of the outputs as
-            `NoiseLevels.of_outputs`, (realizations, outputs, lines), rad.
+        added: on the average, to y, u and q of each run, float64 (3, samples).
+        power: mean square of how far y scatters about that average, by cells, (cells,), rad2.
     """
 
-    added: np.ndarray
-    std: np.ndarray
+    added: Sequence[np.ndarray]
+    power: np.ndarray
+
+    @property
+    def finite(self) -> bool:
+        """Whether no simulation diverged."""
+        return all(np.isfinite(signals).all() for signals in self.added)
 
 
-def coarse(recorded: RecordedExperiment, step: float) -> bool:
-    """Tell whether a motion is of so few counts that its rounding may be no white noise."""
-    return min(float(np.std(r.position)) for r in recorded.realizations) < _FEW_COUNTS * step
+def beside_rounding(
+    fitter: CellFitter, found: Found, progress: Progress = lambda _: None
+) -> tuple[CellFitter, Found]:
+    """Return what fits a motion of few counts, and its fits, if these come nearer to the records.
+
+    What rounding adds is simulated with the best fit, and all are fitted anew beside it. The noise
+    is then what was seen and what rounding scatters. A model that misses more than about half a
+    step cannot say what rounding adds.
+
+    Args:
+        fitter: of the fits.
+        found: the refit of the base parameters, and perhaps causes.
+        progress: told that rounding is simulated.
+    """
+    chosen = fitter, found
+    if not in_few_counts(fitter.evidence):
+        return chosen
+    yardstick = fitter.weights.select_floor  # of all rounds: noise that grows is not nearer
+    least = np.sum(_squares(fitter, found.best) / yardstick)
+    for number in range(_ROUNDS):
+        before, fits = chosen
+        if number and before.misfit(fits.best) < NOTHING_LEFT:
+            break
+        progress("rounding in the loop")
+        rounded = in_the_loop(before.evidence, fits.best.model)
+        if not rounded.finite:
+            break
+        after, again = _fitted_anew(before, fits, rounded)
+        left = np.sum(_squares(after, again.best) / yardstick)
+        if not left < least:
+            break
+        chosen, least = (after, again), left
+    return chosen if chosen[0].misfit(chosen[1].best) < _NEAR else (fitter, found)
 
 
-def in_the_loop(simulator: Simulator, model: Model, step: float, shape: tuple[int, ...]) -> Rounded:
+def _fitted_anew(fitter: CellFitter, found: Found, rounded: Rounded) -> tuple[CellFitter, Found]:
+    """Return what fits beside rounding, and steps fitted anew; rivals stay, and are judged anew."""
+    evidence = fitter.evidence
+    other = CellFitter(_evidence(evidence, rounded), fitter.nominal, fitter.tolerance)
+    steps = [other.refit(), *(other.taken_over(fit) for fit in found.steps[1:])]
+    rivals = {
+        count: [replace(f, left=other.left_by(f.model, f.variance)) for f in fits]
+        for count, fits in found.rivals.items()
+    }
+    return other, replace(found, steps=steps, rivals=rivals)
+
+
+def in_few_counts(evidence: Evidence) -> bool:
+    """Tell whether a motion in a known loop is of so few counts that its rounding is not white.
+
+    Only where rounding is more than the noise, and counts lie where those of the simulator do.
+    """
+    if evidence.slow or not evidence.noise.rounds or None in evidence.player.loop.laws:
+        return False
+    positions = [record.position for record in evidence.records.records]
+    step = step_of(evidence)
+    counts = np.array([position[0] for position in positions]) / step
+    on_grid = float(np.abs(counts - np.rint(counts)).max()) < _OFF_GRID
+    return on_grid and min(float(np.std(p)) for p in positions) < _FEW_COUNTS * step
+
+
+def step_of(evidence: Evidence) -> float:
+    """Return the step of an encoder that has one, rad."""
+    step = evidence.noise.step_rad
+    assert step is not None
+    return step
+
+
+def with_step(model: Model, step: float) -> Model:
+    """Return a model whose encoder counts in steps (rad)."""
+    return model.with_effects({STEP: step})
+
+
+def in_the_loop(evidence: Evidence, model: Model) -> Rounded:
     """Return what rounding does to the motion of a model whose encoder does not round.
 
     Args:
-        simulator: of a loop that is known.
+        evidence: records whose loop is known, and the step of whose encoder is.
         model: the model.
-        step: of the encoder, rad.
-        shape: realizations, outputs and lines.
     """
     rng = np.random.default_rng(0)
-    rounds = model.with_effects({f"{ROUNDING}.resolution_rad": step})
-    realizations, outputs, lines = shape
-    smooth = np.stack(simulator.motion(model, range(realizations)), axis=1)
-    added, scatter = np.empty_like(smooth), np.empty(shape)
-    for index in range(realizations):  # one by one, for the memory that runs of hours take
-        noise = rng.normal(0.0, _DITHER * step, (_SIMULATED, simulator.samples))
-        runs = np.array(run_parallel(partial(simulator.disturbed, rounds, index), list(noise)))
-        added[index] = runs.mean(axis=0) - smooth[index]
-        spectra = line_spectrum(runs[:, [0, 2][:outputs]], lines)
-        scatter[index] = np.var(spectra, axis=0, ddof=1)
-    scatter = uniform_filter1d(scatter, _ALIKE, mode="nearest")
-    return Rounded(added, np.sqrt((1.0 + 1.0 / _SIMULATED) * scatter))
+    step, simulator = step_of(evidence), evidence.player.adding(None)
+    records, levels = evidence.records.records, evidence.records.levels
+    smooth = simulator.run([model], range(len(records)))[0]
+    added: list[np.ndarray] = []
+    scatter: dict[int, list[np.ndarray]] = {level: [] for level in levels}
+    for index, record in enumerate(records):  # one by one, for the memory that long runs take
+        play = partial(simulator.disturbed, with_step(model, step), index)
+        noise = rng.normal(0.0, _DITHER * step, (_SIMULATED, record.samples))
+        runs = np.array(run_parallel(play, list(noise)))
+        added.append(runs.mean(axis=0) - smooth[index])
+        lines = lapped(runs[:, 0], evidence.hop)[..., : evidence.lines]
+        scatter[record.level].append(np.var(lines, axis=0, ddof=1))
+    by_line = np.array([np.concatenate(scatter[level]).mean(axis=0) for level in levels])
+    by_band = np.add.reduceat(by_line, evidence.edges[:-1], axis=1) / np.diff(evidence.edges)
+    return Rounded(added, (1.0 + 1.0 / _SIMULATED) * by_band.ravel())
 
 
-def with_rounding(
-    attribution: Attribution, plain: tuple[Misfit, Misfit], step: float
-) -> Attribution:
-    """Return an attribution that names the rounding, if its best explanation leaves that alone.
-
-    Args:
-        attribution: from misfits whose variance is widened by the rounding.
-        plain: misfits of the training and of the held-out data whose variance is not.
-        step: of the encoder, rad.
-    """
-    best = attribution.best
-    if not attribution.explained or best.held_chi2 > PLAIN * plain[1].size:
-        return attribution
-
-    def costs(fit: Fit) -> tuple[float, float]:
-        train, held = (misfit.chi2(fit.model) * misfit.size for misfit in plain)
-        return train, held
-
-    held = costs(best)[1]
-    gain = SECOND_GAIN if best.effects else SMALL_GAIN
-    if held - best.held_chi2 < CERTAIN or held < gain * best.held_chi2:
-        return attribution
-    found = _rounded(best, step)
-    tied = tuple(_rounded(fit, step) for fit in attribution.tied)
-    more = held - best.held_chi2
-    others = [
-        replace(f, held_chi2=f.held_chi2 + more)
-        for f in attribution.candidates
-        if ROUNDING not in f.effects
-    ]
-    train, held = costs(attribution.refit)
-    return Attribution(
-        replace(attribution.refit, train_chi2=train, held_chi2=held), (found, *tied, *others),
-        found, tied, True, attribution.complete, (more + best.held_chi2) / plain[1].size,
-    )  # fmt: skip
+def _evidence(evidence: Evidence, rounded: Rounded) -> Evidence:
+    """Return the evidence beside simulations to which is added what rounding does."""
+    seen = evidence.noise.seen_rad
+    white = evidence.noise.std_rad**2  # at the least, where no noise beside it is seen
+    power = np.maximum(rounded.power, white) if math.isnan(seen) else rounded.power + seen**2
+    return evidence.played_by(evidence.player.adding(rounded.added), power)
 
 
-def smooth(model: Model) -> Model:
-    """Return a model whose encoder does not round."""
-    left = {name: value for name, value in model.effects.items() if not name.startswith(ROUNDING)}
-    return replace(model, effects=left)
-
-
-def _rounded(fit: Fit, step: float) -> Fit:
-    """Return a fit with the encoder's step, which is known and not fitted."""
-    name = f"{ROUNDING}.resolution_rad"
-    space, solution = fit.space, fit.solution
-    return replace(
-        fit,
-        effects=tuple(sorted((*fit.effects, ROUNDING))),
-        model=fit.model.with_effects({name: step}),
-        space=replace(space, effects=(*space.effects, name), units=(*space.units, step)),
-        solution=replace(
-            solution,
-            x=np.append(solution.x, 1.0),
-            jacobian=np.hstack([solution.jacobian, np.zeros((solution.residuals.size, 1))]),
-        ),
-    )
+def _squares(fitter: CellFitter, fit: CellFit) -> np.ndarray:
+    """Return the squared error that a fit leaves on unseen parts, by part and band, rad2."""
+    return fitter.weights.counts * (fit.left - fitter.weights.select_floor)

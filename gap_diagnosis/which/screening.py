@@ -39,11 +39,6 @@ Proposal = tuple[float, Space, np.ndarray]
 """A starting point: what it costs, the space it lies in, the point."""
 
 
-def sums_of_squares(errors: np.ndarray) -> np.ndarray:
-    """Return what errors of known variance cost."""
-    return np.einsum("ij,ij->i", errors, errors)
-
-
 @dataclass(frozen=True)
 class _Candidate:
     """A seed, how it changes the errors, its linearly best size and what that would gain."""
@@ -64,7 +59,7 @@ class Screening:
         seeds: Sequence[Mapping[str, float]],
         space_of: Callable[[Mapping[str, float]], Space],
         errors: Errors,
-        costs: Costs = sums_of_squares,
+        costs: Costs,
         largest: float = LARGEST,
     ) -> None:
         """Evaluate all seeds once.
@@ -271,14 +266,3 @@ def _scales(name: str) -> bool:
 def is_size(name: str) -> bool:
     """Tell whether a parameter, by its full name, switches its effect or a part of it."""
     return fx.parameter(name).role in ("size", "limit", "harmonic")
-
-
-def different(proposals: Sequence[Proposal], most: int) -> list[Proposal]:
-    """Return the best proposals that differ by more than a size, at the most `most`."""
-    kept: list[Proposal] = []
-    for proposal in proposals:
-        if all(proposal[1] is not other[1] for other in kept):
-            kept.append(proposal)
-        if len(kept) == most:
-            break
-    return kept

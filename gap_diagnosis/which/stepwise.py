@@ -10,7 +10,8 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 
-from .cell_fits import CellFit, CellFitter
+from .cell_fits import CellFitter
+from .comparison import NOTHING_LEFT, CellFit
 from .exchange import drop_hindering, replace_bounded
 from .extension import Extension
 from .found import Found
@@ -20,8 +21,6 @@ from .gains import closed, left_of
 MOST_CAUSES = 5
 _PARENTS = 3  # leading fits beside which a second cause is looked for
 _HALVES = 2  # the same of fits that repeat but close too little
-NOTHING_LEFT = 2.0
-"""Mean squared error over noise below which noise explains what is left."""
 LEAST_CLOSED = 0.25
 """Least share of what is left, in the band where it gains most, that a further cause closes: one
 that closes less would not be named, for it may be a part of what no effect explains."""
@@ -62,7 +61,7 @@ class Stepwise:
         """Search forward from the fit of the base parameters alone."""
         found = Found([refit])
         while len(found.best.effects) < MOST_CAUSES:
-            if self._fitter.misfit(found.best) < NOTHING_LEFT:
+            if self._fitter.left_in_a_band(found.best) < NOTHING_LEFT:
                 break
             if self._over:
                 found.complete = False

@@ -126,8 +126,9 @@ def test_a_nominal_that_is_unstable_in_the_loop_is_bad_data(run, bags, tmp_path)
     assert any("nominal loop is not stable" in note for note in diagnosis.notes)
 
 
-def test_ctrl_c_leaves_an_earlier_diagnosis_as_it_was(bags, start_program, tmp_path):
-    out = tmp_path / "out"
+def test_ctrl_c_leaves_an_earlier_diagnosis_as_it_was(start_program, tmp_path):
+    late = simulate_case({"delay.time_s": 1e-3}, seed=3, levels_rad=(7e-3,))
+    bags, out = write_bags(late, tmp_path / "bags"), tmp_path / "out"
     out.mkdir()
     (out / "diagnosis.json").write_text("earlier")
     command = ["diagnose", str(bags), "--nominal", "paper", "--out", str(out)]

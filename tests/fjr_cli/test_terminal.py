@@ -14,7 +14,6 @@ from fjr_bringup.replay.comparison import Difference
 from fjr_bringup.replay.publishing import Published, PublishedTopic
 from fjr_cli import analysis_summary, diagnosis_summary
 from fjr_cli.replay_summary import print_differences, print_published
-from gap_diagnosis.how_far.steps import steps
 from gap_diagnosis.outcome.diagnosis import (
     Candidate,
     Cause,
@@ -78,7 +77,20 @@ def test_diagnose_cuts_no_number_and_says_the_share_as_a_sentence(console):
         verdict="ambiguous",
         effects=effects,
         confidence=0.5,
-        steps=steps(gap, effects),
+        steps=[
+            Step(
+                added=added,
+                stage=stage,
+                nrmse_position=of.nrmse_position,
+                nrmse_torque=of.nrmse_torque,
+                chi2_per_dof=of.chi2_per_dof,
+            )
+            for stage, of, added in (
+                ("nominal", gap.nominal, None),
+                ("refit", gap.refit, None),
+                ("cause", gap.explained, " + ".join(effects)),
+            )
+        ],
         gap=gap,
         gap_closed=0.987,
         gap_figures=GapFigures(position=stage, torque=stage, bla_sigma=stage, distortion_db=stage),

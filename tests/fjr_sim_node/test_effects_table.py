@@ -124,12 +124,12 @@ from fjr_sim_node.plant import PLANT
 from fjr_sim_node.simulation.simulator import SIMULATOR, run_realization
 from fjr_interface.parameter_file import load_parameter_file
 from fjr_bringup.campaign.plan import Campaign
-from fjr_records.noise import noise_levels
 from fjr_records.periodic import RecordedExperiment, RecordedRealization
-from gap_diagnosis.model.rig_model import Model
-from gap_diagnosis.model.simulated_rig import Simulator
+from gap_diagnosis.model.evidence import Evidence
+from gap_diagnosis.model.steady_runs import steady_runs
 from gap_diagnosis.outcome.verdict_words import explanation, unit_of
-from gap_diagnosis.which.fits import Fitter
+from gap_diagnosis.which.catalogue import catalogue
+from gap_diagnosis.which.cell_fits import CellFitter
 
 name = "cubic_drag.nm_s3_rad3"
 assert SIMULATOR[name].unit == "N m s3/rad3"
@@ -148,14 +148,13 @@ for number in range(2):
     parts.append(RecordedRealization(str(number), e, cut(run.reference), cut(run.torque),
                                      cut(run.position), None))
 recorded = RecordedExperiment("here", tuple(parts))
-model, simulator = Model.nominal(PLANT.defaults()), Simulator(recorded)
-noise = noise_levels(recorded).of_outputs(recorded)
-fitter = Fitter(recorded, simulator, noise, model.plant, (0,), (1,))
-assert "cubic_drag" in fitter.catalogue
+nominal = PLANT.defaults()
+fitter = CellFitter(Evidence(steady_runs(recorded), nominal), nominal, 0.1)
+assert "cubic_drag" in catalogue(nominal)
 refit = fitter.refit()
 found = fitter.add(refit, "cubic_drag", fitter.screening(refit, "cubic_drag").proposals())
 assert abs(found.model.effects[name] / 2.0 - 1.0) < 0.02, found.model.effects
-assert found.held_chi2 < 0.5 * refit.held_chi2
+assert fitter.gains(found, refit).sum() > 10.0
 """
 
 

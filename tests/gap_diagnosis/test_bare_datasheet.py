@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from test_evidence import NOMINAL, records
 
+from gap_diagnosis.any_record import investigate
+from gap_diagnosis.investigation import LOST, Investigation, Order, investigate_runs
 from gap_diagnosis.model.evidence import Evidence
-from gap_diagnosis.record_investigation import LOST, RecordInvestigation, investigate_records
 from gap_diagnosis.which.cell_fits import CellFitter
 from gap_diagnosis.which.equivalents import founded
 from gap_diagnosis.which.exchange import replace_bounded
@@ -27,9 +28,9 @@ BIAS_NM = 6.0
 
 
 @pytest.fixture(scope="module")
-def found() -> RecordInvestigation:
+def found() -> Investigation:
     made = records({"torque_bias.torque_nm": BIAS_NM}, runs=3, scatter=0.03, seconds=6.0)
-    return investigate_records(made, BARE, effects=LOOKED_FOR)
+    return investigate(made, BARE, effects=LOOKED_FOR)
 
 
 def test_the_whole_friction_is_named_and_no_part_of_it_in_its_place(found):
@@ -125,6 +126,6 @@ def test_a_law_whose_shape_comes_to_a_bound_gives_way_to_the_law_that_it_is_ther
 
 def test_where_the_refit_misses_far_more_than_the_motion_nothing_is_searched():
     absurd = {**NOMINAL, "jm": 1e-4, "k0": 5.0, "fsm": 0.0, "fvm": 0.01}
-    tried = investigate_records(records(), absurd)
+    tried = investigate_runs(records(), Order(absurd))
     assert LOST in tried.diagnosis.notes and tried.diagnosis.verdict == "unexplained"
-    assert len(tried.found.steps) == 1 and tried.found.rivals == {1: []}
+    assert len(tried.fitted.found.steps) == 1 and tried.fitted.found.rivals == {1: []}

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import copy
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from gap_cases import SHORT, simulate_case
+from gap_cases import NOISE_RAD, SHORT, simulate_case
 
-from fjr_records.noise import noise_levels
-from fjr_records.spectra import line_spectrum
 from fjr_sim_node import effects as fx
 from fjr_sim_node.plant import PLANT
+from gap_diagnosis.model.evidence import Evidence
+from gap_diagnosis.model.record_rig import RecordSimulator
 from gap_diagnosis.model.rig_model import Model
-from gap_diagnosis.model.simulated_rig import Simulator
+from gap_diagnosis.model.steady_runs import LEAST_OF_LEVEL, compared, steady_runs
 
 EFFECTS = {
     "backlash": {"backlash.half_gap_rad": 1e-3},
@@ -39,55 +42,83 @@ def case():
     return simulate_case(seed=4, **SHORT)
 
 
-def begun_near(case, model: Model) -> Simulator:
-    """Return what begins near a model, as exactly as the noise of the case calls for."""
-    near, noise = Simulator(case.recorded), noise_levels(case.recorded)
-    every = range(len(case.recorded.realizations))
-    near.begin_near(model, noise.of_outputs(case.recorded), every)
-    return near
+def players(case, nominal) -> tuple[RecordSimulator, RecordSimulator]:
+    """Return what plays runs from rest, and what begins near the steady state of a nominal."""
+    near = Evidence(steady_runs(case.recorded), nominal).player
+    cold = copy.copy(near)
+    cold._begins = {}
+    return cold, near
+
+
+def periods(player: RecordSimulator, model: Model) -> np.ndarray:
+    """Return the steady period of y of each run, (runs, N)."""
+    records = player.records
+    runs = player.run([model], range(len(records.records)))[0]
+    return np.array([run[0, records.run_in :] for run in runs])
 
 
 @pytest.mark.parametrize("name", EFFECTS)
 def test_the_steady_period_is_that_from_rest(case, name):
     assert all(fx.parameter(parameter) for parameter in EFFECTS[name])
-    cold, near = Simulator(case.recorded), begun_near(case, Model(case.truth.plant, {}))
+    cold, near = players(case, case.truth.plant)
     bent = {n: v * (0.9 if n == "k0" else 1.05) for n, v in case.truth.plant.items()}
-    models = [Model(bent, EFFECTS[name])]
-    from_rest, begun = cold.many(models), near.many(models)
+    from_rest, begun = (periods(player, Model(bent, EFFECTS[name])) for player in (cold, near))
     off = np.sqrt(np.mean((begun - from_rest) ** 2) / np.mean(from_rest**2))
     assert 0.0 < off < 3e-5
 
 
 @pytest.mark.parametrize("name", SLOW)
 def test_what_remembers_for_long_is_played_from_rest(case, name):
-    cold, near = Simulator(case.recorded), begun_near(case, Model(case.truth.plant, {}))
-    models = [Model(case.truth.plant, SLOW[name])]
-    assert np.array_equal(cold.many(models), near.many(models))
+    cold, near = players(case, case.truth.plant)
+    model = Model(case.truth.plant, SLOW[name])
+    assert np.array_equal(periods(cold, model), periods(near, model))
 
 
-def test_where_a_model_begins_hardly_adds_to_its_misfit(case):
+def test_where_a_model_begins_hardly_adds_to_its_misfit():
     """A tail of 3e-4 of the rms, all in the lowest lines, made a misfit of 8 of one of 0.7."""
     truth = {"torque_speed_limit.stall_nm": 400.0, "torque_speed_limit.no_load_rad_s": 40.0}
     other = simulate_case(truth, seed=3, **SHORT)
-    cold, near = Simulator(other.recorded), begun_near(other, Model.nominal(PLANT.defaults()))
-    models, lines = [other.truth], other.recorded.lines
-    off = line_spectrum(near.many(models) - cold.many(models), lines)[0, :, 0]
-    noise = noise_levels(other.recorded).of_outputs(other.recorded)[:, 0]
-    added = np.mean(np.abs(off / noise) ** 2, axis=1)
+    evidence = Evidence(steady_runs(other.recorded), PLANT.defaults())
+    every = range(len(evidence.parts))
+    begun = evidence.errors([other.truth], every)[0]
+    evidence.player._begins = {}
+    off = begun - evidence.errors([other.truth], every)[0]
+    added = evidence.mean_squares(off, every) / evidence.floor(every)
     assert np.any(added > 0.0) and np.all(added < 0.1)
 
 
-def test_realizations_that_are_not_named_are_played_from_rest(case):
-    near, noise = Simulator(case.recorded), noise_levels(case.recorded)
-    near.begin_near(Model(case.truth.plant, {}), noise.of_outputs(case.recorded), [0])
-    models = [Model(case.truth.plant, EFFECTS["gravity"])]
-    from_rest = Simulator(case.recorded).many(models)
-    same = [np.array_equal(*runs) for runs in zip(near.many(models)[0], from_rest[0], strict=True)]
-    assert same == [False, *[True] * (len(same) - 1)]
-
-
 def test_less_is_simulated(case):
-    simulator = begun_near(case, Model(case.truth.plant, {}))
-    period = case.recorded.experiment.samples_per_period
-    begins = [simulator._begins[index][0] for index in range(len(case.recorded.realizations))]
-    assert all(0 < begin < simulator.samples - period for begin in begins)
+    _, near = players(case, case.truth.plant)
+    begins = [near._begins[index][0] for index in range(len(case.recorded.realizations))]
+    assert all(0 < begin < near.records.run_in for begin in begins)
+
+
+def test_what_is_compared_is_the_mean_of_the_steady_periods(case):
+    runs = steady_runs(case.recorded)
+    for run, record in zip(case.recorded.realizations, runs.records, strict=True):
+        mean = run.kept(run.position).mean(axis=0)
+        assert np.array_equal(record.position[runs.run_in :], mean)
+        assert np.array_equal(record.position[: runs.run_in], run.position[:-2].ravel())
+    assert runs.noise.std_rad == pytest.approx(NOISE_RAD / np.sqrt(2.0), rel=0.1)
+
+
+def test_of_many_realizations_those_of_each_level_that_reach_most_torque_are_compared():
+    one = simulate_case(seed=4, **SHORT).recorded
+    long = 60.0 * one.sample_rate_hz / one.experiment.samples_per_period
+    many = [
+        replace(run, name=f"run {i}", torque=(1.0 + 0.1 * i) * run.torque)
+        for i in range(9)
+        for run in one.realizations
+    ]
+    stretched = [replace(r, position=np.repeat(r.position, round(long), axis=1)) for r in many]
+    description = one.experiment.model_copy(
+        update={"samples_per_period": stretched[0].position.shape[1]}
+    )
+    slow = replace(
+        one, realizations=tuple(replace(r, experiment=description.model_copy(
+            update={"level": r.level})) for r in many)
+    )  # fmt: skip
+    chosen = compared(slow)
+    assert len(chosen) == 2 * LEAST_OF_LEVEL
+    assert {slow.realizations[i].name for i in chosen} == {"run 6", "run 7", "run 8"}
+    assert compared(one) == list(range(len(one.realizations)))

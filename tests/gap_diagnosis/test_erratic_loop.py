@@ -14,9 +14,8 @@ from fjr_records.records import Record, RecordSet
 from fjr_sim_node import effects as fx
 from fjr_sim_node.plant import PLANT, coefficients
 from fjr_sim_node.simulation.closed_loop import simulate_law
-from gap_diagnosis.any_record import investigate_any
+from gap_diagnosis.any_record import investigate
 from gap_diagnosis.model.evidence import Evidence
-from gap_diagnosis.record_investigation import investigate_records
 
 RATE, NOISE = 1000.0, 2e-6
 COULOMB, VISCOUS = 20.0, 200.0
@@ -74,7 +73,7 @@ def test_a_loop_that_swings_without_end_is_not_simulated_and_friction_is_found()
     loop = Evidence(records, BARE).simulator.loop
     assert loop.kind == "unknown" and loop.laws == (None, None)
     assert "By the datasheet the loop of run_0, run_1 swings" in loop.notes[-1]
-    diagnosis = investigate_records(records, BARE, effects=KNOWN).diagnosis
+    diagnosis = investigate(records, BARE, effects=KNOWN).diagnosis
     assert {cause.effect for cause in diagnosis.causes} == {"coulomb_friction", "viscous_friction"}
     found = diagnosis.parameters
     assert found["coulomb_friction.motor_nm"].value == pytest.approx(COULOMB, rel=0.1)
@@ -92,15 +91,15 @@ def test_steady_periods_of_a_loop_that_swings_without_the_missing_friction_are_n
     smooth = {**PLANT.defaults(), **dict.fromkeys(FRICTION, 0.0)}
     case = simulate_case({}, seed=5, controller={"p": p, "d": 60.0, "n": 24.0}, **SHORT)
     looked_for = (*ADDED, "delay", "actuator_lag")
-    found = investigate_any(case.recorded, smooth, effects=looked_for).diagnosis
+    found = investigate(case.recorded, smooth, effects=looked_for).diagnosis
     assert sorted(found.effects) == sorted(ADDED)
     sizes = {fx.parameter(n).adds_to: e.value for n, e in found.parameters.items() if "." in n}
     assert sizes == pytest.approx({name: case.rig[name] for name in FRICTION}, rel=0.01)
 
 
 def test_what_cannot_be_simulated_with_its_causes_either_stays_bad_data(monkeypatch):
-    monkeypatch.setattr("gap_diagnosis.any_record.discretisation_error", lambda *_: np.ones(1))
+    monkeypatch.setattr("gap_diagnosis.steady_periods.discretisation_error", lambda *_: np.ones(1))
     smooth = {**PLANT.defaults(), **dict.fromkeys(FRICTION, 0.0)}
     case = simulate_case({}, seed=5, controller={"p": 600.0, "d": 60.0, "n": 24.0}, **SHORT)
-    found = investigate_any(case.recorded, smooth, effects=ADDED).diagnosis
+    found = investigate(case.recorded, smooth, effects=ADDED).diagnosis
     assert found.verdict == "bad_data" and not found.effects

@@ -11,9 +11,10 @@ from gap_cases import SHORT, fitter_of, simulate_case
 from gap_diagnosis.model.rig_model import Model
 from gap_diagnosis.outcome.cause_words import digits, percent
 from gap_diagnosis.outcome.diagnosis import Estimate
-from gap_diagnosis.which.estimates import estimates, standard_errors, sure
-from gap_diagnosis.which.fits import Fit
+from gap_diagnosis.which.comparison import CellFit
+from gap_diagnosis.which.estimates import kept_from_zero, linear_estimates, standard_errors
 from gap_diagnosis.which.least_squares import Solution
+from gap_diagnosis.which.presence import beyond_zero, cell_estimates
 from gap_diagnosis.which.search_space import Space
 
 LINES, GROUPS = 600, 12
@@ -71,7 +72,18 @@ def test_a_parameter_that_one_group_nearly_alone_tells_is_as_uncertain_as_that_g
     assert alone < standard_errors(jacobian, residuals, GROUP)[1] < 12.0 * alone
 
 
-def fitted(names: tuple[str, ...], values: tuple[float, ...], stds: tuple[float, ...]) -> Fit:
+def fit_of(effects, model: Model, space: Space, solution: Solution) -> CellFit:
+    """Return a fit without evidence."""
+    return CellFit(effects, space, model, solution, np.ones(1), np.ones((1, 1)))
+
+
+def intervals(fit: CellFit) -> dict[str, Estimate]:
+    """Return the linear intervals of a fit to the lines above."""
+    solution = fit.solution
+    return linear_estimates(fit, standard_errors(solution.jacobian, solution.residuals, GROUP))
+
+
+def fitted(names: tuple[str, ...], values: tuple[float, ...], stds: tuple[float, ...]) -> CellFit:
     """Return a fit of effects whose parameters have these values and standard errors."""
     rng = np.random.default_rng(6)
     columns = np.linalg.qr(rng.standard_normal((LINES, len(names))))[0] / np.array(stds)
@@ -79,7 +91,7 @@ def fitted(names: tuple[str, ...], values: tuple[float, ...], stds: tuple[float,
     effects = tuple(dict.fromkeys(name.split(".")[0] for name in names))
     model = Model({}, dict(zip(names, values, strict=True)))
     solution = Solution(np.array(values), 0.0, columns, residuals, True)
-    return Fit(effects, model, Space({}, names, (1.0,) * len(names)), solution, 0.0, 0.0)
+    return fit_of(effects, model, Space({}, names, (1.0,) * len(names)), solution)
 
 
 BIAS, ECCENTRIC = "torque_bias.torque_nm", "encoder_eccentricity.amplitude_rad"
@@ -100,36 +112,41 @@ PRESLIDING = ("presliding_friction.motor_rad", "presliding_friction.link_rad")
     ],
 )
 def test_an_effect_whose_size_may_be_zero_is_not_sure(names, values, stds, there):
-    assert sure(fitted(names, values, stds), GROUP) is there
+    fit = fitted(names, values, stds)
+    found = intervals(fit)
+    assert all(beyond_zero(effect, found, 0.0) for effect in fit.effects) is there
 
 
 def test_a_gain_is_known_as_far_as_the_datasheet_is():
-    names, rng = ("torque_gain.relative_error",), np.random.default_rng(7)
-    base = np.linalg.qr(rng.standard_normal((LINES, 3)))[0] * 1e3
-    jacobian = np.column_stack([base, -base.sum(axis=1)])  # a gain scales all of them
-    residuals = rng.standard_normal(LINES)
-    nominal = {"jm": 0.2, "fsm": 6.0, "fvm": 2.0}
-    for gain, there in ((0.3, True), (0.02, False)):
-        x = np.array([0.0, 0.0, 0.0, gain])
-        model = Model(nominal, {names[0]: gain})
-        space = Space(nominal, names, (1.0,), 0.1)
-        solution = Solution(x, 1.0, jacobian, residuals, True)
-        fit = Fit(("torque_gain",), model, space, solution, 1.0, 1.0)
-        found = estimates(fit, GROUP)[names[0]]
-        assert 0.05 < found.high - found.low < 0.2
-        assert sure(fit, GROUP) is there
+    """It scales all other parameters, so data alone say nothing of its size."""
+    gain = "torque_gain.relative_error"
+    fitter = fitter_of(simulate_case(seed=3, off=0.0, **SHORT).recorded)
+    refit = fitter.refit()
+    own = refit.solution.jacobian
+    for size, there in ((0.3, True), (0.02, False)):
+        solution = replace(
+            refit.solution,
+            x=np.append(refit.solution.x, size),
+            jacobian=np.column_stack([own, -own.sum(axis=1)]),
+        )
+        space = replace(refit.space, effects=(gain,), units=(1.0,))
+        model = refit.model.with_effects({gain: size})
+        fit = replace(refit, effects=("torque_gain",), space=space, model=model, solution=solution)
+        found = cell_estimates(fit, fitter, {}, {"torque_gain": refit})
+        assert 0.05 < found[gain].high - found[gain].low < 0.2
+        assert beyond_zero("torque_gain", found, 0.0) is there
 
 
 def test_intervals_tell_of_a_valley_along_which_parameters_replace_each_other():
     """Seen from zero, an eccentric encoder errs in gain, which scales all but Coulomb friction."""
     truth = {"encoder_eccentricity.amplitude_rad": 0.15, "encoder_eccentricity.phase_rad": -1.25}
     case = simulate_case(truth, seed=3, noise_rad=5e-4, **SHORT)
-    fitter = fitter_of(case)[2]
+    fitter = fitter_of(case.recorded)
     refit = fitter.refit()
     screening = fitter.screening(refit, "encoder_eccentricity")
-    fit = fitter.add(refit, "encoder_eccentricity", screening.proposals())
-    assert fit.converged and fit.held_chi2 / fitter.held.size < 1.2
-    found = estimates(fit, fitter.train.groups())
+    fit = fitter.further(fitter.add(refit, "encoder_eccentricity", screening.proposals()))
+    assert fitter.misfit(fit) < 1.3
+    found = cell_estimates(fit, fitter, {}, {"encoder_eccentricity": refit})
     for name, value in case.truth.plant.items():
         std = (found[name].high - found[name].low) / 3.92
         assert abs(found[name].value - value) < 4.0 * std, name
@@ -137,11 +154,12 @@ def test_intervals_tell_of_a_valley_along_which_parameters_replace_each_other():
 
 
 def test_the_jacobian_that_intervals_rest_on_is_exact_where_the_loop_bends_soon():
-    fitter = fitter_of(simulate_case(seed=0, **SHORT))[2]
+    fitter = fitter_of(simulate_case(seed=0, **SHORT).recorded)
     fit = fitter.refit()
     x, half = fit.solution.x, 1e-6
     points = [x + sign * half * row for row in np.eye(x.size) for sign in (1.0, -1.0)]
-    errors = fitter.train.errors([fit.space.model(point) for point in points])
+    models = [fit.space.model(point) for point in points]
+    errors = fitter.evidence.errors(models, fitter.fit_parts) * fitter.weights.weight(fit.variance)
     central = ((errors[0::2] - errors[1::2]) / (2.0 * half)).T
     off = np.linalg.norm(fit.solution.jacobian - central, axis=0)
     assert (off < 1e-3 * np.linalg.norm(central, axis=0)).all()
@@ -155,16 +173,15 @@ def test_a_size_that_its_shape_hides_is_kept_from_zero_by_the_fit_without_it():
     names = ("backlash.half_gap_rad", "piecewise_stiffness.soft_ratio")
     space = Space({}, names, (1e-3, 1.0))
     model = Model({}, dict(zip(names, (1e-3, 0.5), strict=True)))
-    fit = Fit(("backlash",), model, space, solution, 3.0, 3.0)
-    groups = np.array([0, 1, 2])
-    hidden = estimates(fit, groups)["backlash.half_gap_rad"]
-    assert hidden.low == 0.0 and not sure(fit, groups)
-    weak = replace(fit, without={"backlash": 6.0})
-    assert estimates(weak, groups)["backlash.half_gap_rad"] == hidden and not sure(weak, groups)
-    strong = replace(fit, without={"backlash": 3.0 + 4.0 * 1.96**2})
-    seen = estimates(strong, groups)["backlash.half_gap_rad"]
+    std = standard_errors(jacobian, solution.residuals, np.array([0, 1, 2]))
+    linear = linear_estimates(fit_of(("backlash",), model, space, solution), std)
+    hidden = linear["backlash.half_gap_rad"]
+    assert hidden.low == 0.0 and not beyond_zero("backlash", linear, 0.0)
+    assert kept_from_zero(linear, {"backlash": 3.0}) == linear
+    strong = kept_from_zero(linear, {"backlash": 4.0 * 1.96**2})
+    seen = strong["backlash.half_gap_rad"]
     assert seen.low == pytest.approx(0.5e-3) and seen.high == hidden.high
-    assert sure(strong, groups)
+    assert beyond_zero("backlash", strong, 0.0)
 
 
 def test_a_value_that_is_rounded_to_zero_has_no_sign():

@@ -13,8 +13,8 @@ from fjr_interface.experiment import RecordDescription
 from fjr_records.records import Record, RecordSet
 from fjr_sim_node.plant import coefficients
 from fjr_sim_node.simulation.closed_loop import simulate
+from gap_diagnosis.any_record import investigate
 from gap_diagnosis.model.evidence import Evidence
-from gap_diagnosis.record_investigation import investigate_records
 
 RATE, NOISE = 500.0, 2e-6
 MASS, COULOMB, VISCOUS = 95.0, 20.0, 200.0
@@ -74,7 +74,7 @@ def test_the_simulation_errs_by_a_share_of_the_torque_not_of_a_motion_that_is_he
 
 
 def test_friction_of_a_carriage_is_named_though_its_loop_is_not_known():
-    diagnosis = investigate_records(carriage(), BARE, effects=LOOKED_FOR).diagnosis
+    diagnosis = investigate(carriage(), BARE, effects=LOOKED_FOR).diagnosis
     assert {cause.effect for cause in diagnosis.causes} == {"coulomb_friction", "viscous_friction"}
     found = diagnosis.parameters
     assert found["coulomb_friction.motor_nm"].value == pytest.approx(COULOMB, rel=0.1)

@@ -6,7 +6,7 @@ import pytest
 from gap_cases import simulate_case
 
 from fjr_sim_node.plant import PLANT
-from gap_diagnosis.any_record import investigate_any
+from gap_diagnosis.any_record import investigate
 
 SHORT = {"base_frequency_hz": 0.5, "levels_rad": (4e-3, 1.2e-2), "transient_periods": 2}
 FEW = ("encoder_eccentricity", "torque_bias", "delay")
@@ -22,7 +22,7 @@ def case():
 def test_a_stiffness_that_is_far_off_is_no_eccentric_encoder(case, as_record):
     recorded = case.recorded.as_records() if as_record else case.recorded
     nominal = {**PLANT.defaults(), "k0": TOO_STIFF}
-    found = investigate_any(recorded, nominal, effects=FEW).diagnosis
+    found = investigate(recorded, nominal, effects=FEW).diagnosis
     assert found.verdict == "parameters_only" and not found.effects
     off = 100.0 * (1.0 - case.rig["k0"] / TOO_STIFF)
     assert off > 40.0
@@ -33,12 +33,12 @@ def test_a_stiffness_that_is_far_off_is_no_eccentric_encoder(case, as_record):
 def test_without_time_there_are_no_further_looks(case):
     nominal = {**PLANT.defaults(), "k0": TOO_STIFF}
     told: list[str] = []
-    investigate_any(case.recorded, nominal, effects=FEW, budget_s=0.01, progress=told.append)
+    investigate(case.recorded, nominal, effects=FEW, budget_s=0.01, progress=told.append)
     assert not any("once more" in stage for stage in told)
 
 
 def test_an_eccentric_encoder_stays_one_where_all_parameters_would_be_off_alike():
     eccentric = {"encoder_eccentricity.amplitude_rad": 0.2, "encoder_eccentricity.phase_rad": 0.3}
     case = simulate_case(eccentric, seed=6, **SHORT)
-    found = investigate_any(case.recorded, PLANT.defaults(), effects=FEW).diagnosis
+    found = investigate(case.recorded, PLANT.defaults(), effects=FEW).diagnosis
     assert found.effects == ["encoder_eccentricity"]

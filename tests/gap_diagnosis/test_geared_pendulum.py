@@ -13,7 +13,8 @@ import pytest
 
 from fjr_interface.experiment import RecordDescription
 from fjr_records.records import Record, RecordSet
-from gap_diagnosis.record_investigation import RecordInvestigation, investigate_records
+from gap_diagnosis.any_record import investigate
+from gap_diagnosis.investigation import Investigation
 
 RATE, SECONDS, SUBSTEPS = 250, 16, 16
 ROTOR, PENDULUM, WEIGHT = 0.004, 0.006, 0.9
@@ -21,8 +22,14 @@ COULOMB, VISCOUS, LOST = 0.05, 0.03, 0.3
 EFFECTS = ["gravity", "load_friction", "position_friction", "torque_saturation", "cogging",
            "stribeck_friction_motor"]  # fmt: skip
 NOMINAL = {
-    "jm": ROTOR, "j": PENDULUM, "fs": 0.0, "fsm": 0.06, "fv": 0.0, "fvm": 0.028,
-    "k0": math.inf, "k1": 0.0,
+    "jm": ROTOR,
+    "j": PENDULUM,
+    "fs": 0.0,
+    "fsm": 0.06,
+    "fv": 0.0,
+    "fvm": 0.028,
+    "k0": math.inf,
+    "k1": 0.0,
 }  # fmt: skip
 
 
@@ -60,7 +67,7 @@ def played(reference: np.ndarray, gain: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.fixture(scope="module")
-def found() -> RecordInvestigation:
+def found() -> Investigation:
     records = []
     for number, (height, gain) in enumerate([(0.7, 8.0), (0.7, 16.0), (1.4, 8.0), (1.4, 16.0)]):
         reference = moves(number, height)
@@ -71,7 +78,7 @@ def found() -> RecordInvestigation:
         )  # fmt: skip
         y += 1e-5 * np.random.default_rng(number).standard_normal(y.size)
         records.append(Record(f"run_{number}", described, reference, u, y, None))
-    return investigate_records(RecordSet("test", RATE, tuple(records)), NOMINAL, effects=EFFECTS)
+    return investigate(RecordSet("test", RATE, tuple(records)), NOMINAL, effects=EFFECTS)
 
 
 def test_the_weight_and_the_loss_in_the_gear_are_named_with_their_sizes(found):

@@ -47,7 +47,7 @@ def searched():
 
 def test_what_is_left_after_a_first_cause_was_taken_out_is_shown_cause_after_cause(searched):
     fitter, fits = searched
-    found, tested = kept(fitter, Found(fits), SCATTER, lambda _: None)
+    found, tested = kept(fitter, Found(fits), SCATTER, lambda _: None, fits[-1].effects)
     assert {t.effect for t in tested} == set(found.best.effects) == {"delay", "torque_bias"}
     assert [len(fit.effects) for fit in found.steps] == [0, 1, 2]
     first, both = (fit.model.effects for fit in found.steps[1:])

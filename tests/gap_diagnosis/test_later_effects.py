@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from gap_cases import SHORT, fitter_of, simulate_case
+from gap_cases import SHORT, fitter_of, found_in, simulate_case
 
-from gap_diagnosis.which.search import Search
+from fjr_sim_node.plant import PLANT
 
 pytestmark = pytest.mark.slow
 
@@ -37,12 +37,13 @@ def test_an_effect_is_fitted_with_its_values(effect):
     truth, near = CASES[effect]
     named = {f"{effect}.{name}": value for name, value in truth.items()}
     levels = LOW if effect == "lugre_friction" else SHORT["levels_rad"]
-    fitter = fitter_of(simulate_case(named, seed=3, **{**SHORT, "levels_rad": levels}))[2]
+    case = simulate_case(named, seed=3, **{**SHORT, "levels_rad": levels})
+    fitter = fitter_of(case.recorded)
     refit = fitter.refit()
     fit = fitter.add(refit, effect, fitter.screening(refit, effect).proposals())
-    fit = fit if fit.converged else fitter.continued(fit)
-    assert refit.held_chi2 / fitter.held.size > 3.0
-    assert fit.held_chi2 / fitter.held.size < 1.5
+    fit = fitter.to_its_end(fit)
+    assert fitter.misfit(refit) > 3.0
+    assert fitter.misfit(fit) < 1.5
     for name, share in near.items():
         found = fit.model.effects[f"{effect}.{name}"]
         assert found == pytest.approx(truth[name], rel=share), name
@@ -60,8 +61,7 @@ def test_an_effect_is_fitted_with_its_values(effect):
 )
 def test_losses_that_grow_with_the_load_are_in_one_set(truth):
     # while the motor slides they differ by the parameters behind the gear alone
-    fitter = fitter_of(simulate_case(truth, seed=3, **SHORT))[2]
-    fitter.catalogue = ["load_friction", "directional_loss"]
-    found = Search(fitter).run()
-    named = {found.best.effects, *(fit.effects for fit in found.tied)}
-    assert named == {("load_friction",), ("directional_loss",)}
+    recorded = simulate_case(truth, seed=3, **SHORT).recorded
+    losses = ["directional_loss", "load_friction"]
+    found, _ = found_in(recorded, PLANT.defaults(), *losses)
+    assert [sorted(members) for members in found.equivalent] == [losses]

@@ -14,11 +14,11 @@ from fjr_records.records import Record, RecordSet
 from fjr_sim_node import effects as fx
 from fjr_sim_node.plant import PLANT, coefficients
 from fjr_sim_node.simulation.closed_loop import simulate
-from gap_diagnosis.any_record import investigate_any
+from gap_diagnosis.any_record import investigate
+from gap_diagnosis.investigation import LOST, Investigation, Order, investigate_runs
 from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.model.quasi_static import stations
 from gap_diagnosis.model.rig_model import Model
-from gap_diagnosis.record_investigation import LOST, RecordInvestigation, investigate_records
 from gap_diagnosis.report.gap_output import write_diagnosis
 
 RATE, KEPT = 1000.0, 20
@@ -97,8 +97,8 @@ def test_the_torque_along_a_slow_motion_holds_what_the_gear_of_a_rigid_axis_lose
 
 
 @pytest.fixture(scope="module")
-def found() -> RecordInvestigation:
-    return investigate_any(slow_record(RIPPLE), SMOOTH)
+def found() -> Investigation:
+    return investigate(slow_record(RIPPLE), SMOOTH)
 
 
 def test_cogging_and_the_friction_that_a_datasheet_lacks_are_named(found):
@@ -121,7 +121,7 @@ def test_it_says_that_torques_were_compared(found, tmp_path):
 
 
 def test_a_known_loop_is_played_first(found):
-    assert found.evidence.slow
+    assert found.fitted.evidence.slow
     records = slow_record(RIPPLE, every=1, turns=0.1)
     law = pd_filtered.CONTROLLER.check({"sample_rate_hz": RATE, "p": 3000.0, "d": 150.0})
     (record,) = records.records
@@ -131,7 +131,7 @@ def test_a_known_loop_is_played_first(found):
     reference = record.position + record.torque / 3000.0
     known = replace(record, description=description, reference=reference)
     told: list[str] = []
-    investigate_any(
+    investigate(
         replace(records, records=(known,)), NOMINAL, effects=("cogging",), progress=told.append
     )
     assert told[0] == "windows and noise"
@@ -143,10 +143,10 @@ def test_what_inertia_moves_is_no_slow_motion():
 
 
 def test_a_model_that_misses_more_than_the_motion_names_nothing(monkeypatch):
-    monkeypatch.setattr("gap_diagnosis.record_investigation._misses", lambda *_, **__: 9.0)
+    monkeypatch.setattr("gap_diagnosis.investigation._misses", lambda *_, **__: 9.0)
     records = slow_record(RIPPLE)
     slow = stations(records, SMOOTH)
-    diagnosis = investigate_records(records, SMOOTH, slow=slow).diagnosis
+    diagnosis = investigate_runs(records, Order(SMOOTH), slow).diagnosis
     assert diagnosis.verdict == "unexplained" and not diagnosis.causes
     assert LOST in diagnosis.notes
 
@@ -180,7 +180,7 @@ def test_friction_and_gravity_of_a_stranger_show_only_together():
         position, 1000.0,
         lambda y, v: 30.0 * np.sin(y + 0.4) + 8.0 * np.sign(v) + 12.0 * v, 0.5, 1e-5,
     )  # fmt: skip
-    diagnosis = investigate_any(records, {**ROTOR, "jm": 2.0}).diagnosis
+    diagnosis = investigate(records, {**ROTOR, "jm": 2.0}).diagnosis
     sizes = {name: found.value for name, found in diagnosis.parameters.items()}
     assert sizes["gravity.torque_nm"] == pytest.approx(30.0, rel=0.02)
     assert sizes["coulomb_friction.motor_nm"] == pytest.approx(8.0, rel=0.06)
@@ -191,7 +191,7 @@ def test_friction_and_gravity_of_a_stranger_show_only_together():
 def test_one_speed_one_way_does_not_tell_frictions_apart():
     position = 0.1 / 50.0 * np.arange(6000)
     records = held_record(position, 50.0, lambda y, v: 2.0 * np.sign(v), 0.05)
-    (cause,) = investigate_any(records, ROTOR).diagnosis.causes
+    (cause,) = investigate(records, ROTOR).diagnosis.causes
     alike = {"coulomb_friction", "viscous_friction", "torque_bias"}
     assert alike <= {cause.effect, *cause.others}
 
@@ -203,7 +203,7 @@ def test_a_friction_of_no_catalogue_is_not_named():
     def worn(y, v):
         return np.sign(v) * (2.0 + 1.5 * np.exp(-(((y - 1.0) / 0.3) ** 2))) + 0.5 * v
 
-    diagnosis = investigate_any(held_record(position, 50.0, worn, 0.02), known).diagnosis
+    diagnosis = investigate(held_record(position, 50.0, worn, 0.02), known).diagnosis
     assert diagnosis.verdict == "unexplained" and not diagnosis.causes
 
 

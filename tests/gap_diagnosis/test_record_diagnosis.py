@@ -178,10 +178,10 @@ def test_the_report_has_waterfall_causes_and_a_place_for_every_plot(gravity):
 def test_the_plots_show_the_error_over_time_and_that_the_cause_closes_it_where_it_acts(gravity):
     levels = Page((gravity.out / "report.html").read_text()).data()["levels"]
     for plots in levels:
-        times = [t for t in plots["record-time"]["data"] if t.get("yaxis") == "y2"]
+        times = [t for t in plots["run-time"]["data"] if t.get("yaxis") == "y2"]
         rms = {t["name"]: np.std(t["y"]) for t in times}
         assert rms["refit"] > 1.5 * rms["best explanation"]
-        bands = {t["name"]: t["y"] for t in plots["record-bands"]["data"]}
+        bands = {t["name"]: t["y"] for t in plots["run-bands"]["data"]}
         assert bands["refit"][0] > 3.0 * bands["+ gravity"][0]
         assert 0.2 < bands["+ gravity"][0] < 10.0  # in units of noise
 

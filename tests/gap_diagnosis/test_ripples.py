@@ -1,69 +1,87 @@
-"""Ripples over the motor angle: found without simulating each, and with their second harmonic."""
+"""Ripples of records: what they do is predicted by averages, and the right number is proposed."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from gap_cases import SHORT, fitter_of, simulate_case
+from test_evidence import NOMINAL, RATE, records
 
-from fjr_sim_node import effects
-from gap_diagnosis.which.harmonics import with_second_harmonics
-from gap_diagnosis.which.ripples import RippleSearch
+from gap_diagnosis.model.evidence import Evidence
+from gap_diagnosis.which.cell_fits import CellFitter
+from gap_diagnosis.which.ripples import _averaged
+from gap_diagnosis.which.stepwise import Stepwise
 
-SIZES = {"position_friction": "amplitude_nm", "kinematic_error": "amplitude_rad",
-         "cogging": "amplitude_nm", "torque_constant_ripple": "amplitude"}  # fmt: skip
+CASES = {
+    "position_friction": ({"amplitude_nm": 1.5, "cycles_per_turn": 30.0, "phase_rad": 0.7}, 2.0),
+    "kinematic_error": ({"amplitude_rad": 1e-3, "cycles_per_turn": 33.0, "phase_rad": 0.7}, 4.0),
+    "cogging": ({"amplitude_nm": 1.5, "cycles_per_turn": 57.0, "phase_rad": 0.7}, 1.5),
+    "torque_constant_ripple": (
+        {"amplitude": 0.08, "cycles_per_turn": 31.0, "phase_rad": 0.7}, 1.5,
+    ),
+}  # fmt: skip
+"""Truth, and how near a proposed number of cycles comes to it."""
 
 
-def ripple(effect, size, cycles, **more):
-    names = {SIZES[effect]: size, "cycles_per_turn": cycles, "phase_rad": 0.7, **more}
-    return {f"{effect}.{name}": value for name, value in names.items()}
-
-
-@pytest.mark.parametrize(("effect", "size", "cycles", "off"), [
-    ("position_friction", 0.8, 20.0, 5.0),
-    ("kinematic_error", 3e-4, 33.0, 1.0),
-    ("cogging", 0.8, 57.0, 1.0),
-    ("torque_constant_ripple", 0.05, 31.0, 1.0),
-])  # fmt: skip
-def test_ripples_are_proposed_near_enough_for_the_fit_to_find_them(effect, size, cycles, off):
-    case = simulate_case(ripple(effect, size, cycles), seed=3, **SHORT)
-    recorded, simulator, fitter = fitter_of(case)
+@pytest.mark.parametrize("effect", CASES)
+def test_ripples_are_proposed_near_enough_for_the_fit_to_find_them(effect):
+    truth, off = CASES[effect]
+    named = {f"{effect}.{name}": value for name, value in truth.items()}
+    fitter = CellFitter(Evidence(records(named, runs=2), NOMINAL), NOMINAL, 0.1)
     refit = fitter.refit()
-    proposed = RippleSearch(
-        effect, recorded, simulator, fitter.train, refit.model, refit.solution,
-        fitter.scales.cycles(),
-    ).cycles(most=4)  # fmt: skip
-    assert len(proposed) <= 4
-    assert min(abs(np.array(proposed) - cycles)) <= off
+    proposed = fitter._ripples(refit)[0].cycles(effect, fitter.scales.cycles(), 4)
+    assert min(abs(np.array(proposed) - truth["cycles_per_turn"])) <= off
     fit = fitter.add(refit, effect, fitter.screening(refit, effect).proposals())
-    assert fit.converged and fit.held_chi2 / fitter.held.size < 1.5
     found = fit.model.effects[f"{effect}.cycles_per_turn"]
-    assert found == pytest.approx(cycles, rel=0.01)
+    assert found == pytest.approx(truth["cycles_per_turn"], rel=0.01)
 
 
-def test_a_second_harmonic_is_fitted_where_the_rig_has_one():
-    truth = ripple("cogging", 1.0, 24.0, second_ratio=0.3, second_phase_rad=1.1)
-    fitter = fitter_of(simulate_case(truth, seed=3, **SHORT))[2]
+def test_a_ripple_of_two_harmonics_is_found_as_one_cause():
+    """Taken for one harmonic its number of cycles is off, and the rest looks like another cause."""
+    truth = {
+        "cogging.amplitude_nm": 1.5,
+        "cogging.cycles_per_turn": 40.0,
+        "cogging.phase_rad": 0.7,
+        "cogging.second_ratio": 0.5,
+        "cogging.second_phase_rad": -1.0,
+    }
+    fitter = CellFitter(Evidence(records(truth, runs=2), NOMINAL), NOMINAL, 0.1)
     refit = fitter.refit()
-    plain = fitter.add(refit, "cogging", fitter.screening(refit, "cogging").proposals())
-    richer = with_second_harmonics(fitter, plain)
-    assert richer.converged and richer.held_chi2 < 0.7 * plain.held_chi2
-    assert richer.held_chi2 / fitter.held.size < 1.5
-    effects = richer.model.effects
-    assert effects["cogging.second_ratio"] == pytest.approx(0.3, abs=0.03)
-    assert effects["cogging.cycles_per_turn"] == pytest.approx(24.0, rel=0.01)
+    found = Stepwise(fitter, ["cogging", "torque_bias", "asymmetric_friction"]).run(refit)
+    assert found.best.effects == ("cogging",)
+    for name, value in truth.items():
+        assert found.best.model.effects[name] == pytest.approx(value, rel=0.05)
+    assert fitter.misfit(found.best) < 1.3
 
 
-def test_one_ripple_that_lies_between_two_harmonics_gives_way_to_both():
-    truth = ripple("cogging", 0.3, 24.0, second_ratio=2.5, second_phase_rad=1.1)
-    fitter = fitter_of(simulate_case(truth, seed=3, **SHORT))[2]
-    refit = fitter.refit()
-    plain = fitter.add(refit, "cogging", fitter.screening(refit, "cogging").proposals())
-    assert 30.0 < plain.model.effects["cogging.cycles_per_turn"] < 48.0
-    richer = with_second_harmonics(fitter, plain)
-    assert richer.converged and richer.held_chi2 / fitter.held.size < 1.5
-    assert richer.model.effects["cogging.cycles_per_turn"] == pytest.approx(24.0, rel=0.01)
+def test_a_ripple_of_one_harmonic_gets_no_second():
+    truth = {f"cogging.{name}": value for name, value in CASES["cogging"][0].items()}
+    fitter = CellFitter(Evidence(records(truth, runs=2), NOMINAL), NOMINAL, 0.1)
+    found = Stepwise(fitter, ["cogging", "torque_bias"]).run(fitter.refit())
+    assert found.best.effects == ("cogging",)
+    assert "cogging.second_ratio" not in found.best.model.effects
 
 
-def test_every_ripple_of_the_catalogue_is_searched_for():
-    assert set(SIZES) == {e.identifier for e in effects.CATALOGUE if e.ripple}
+@pytest.mark.parametrize("every", [2, 4])
+def test_averaged_changes_have_the_lines_of_the_changes(every):
+    evidence = Evidence(records(seconds=32.0), NOMINAL)
+    evidence.lines = evidence.hop // (4 * every)
+    assert _averaged(evidence.hop, evidence.lines) == every
+    highest = RATE / (8 * every)
+    samples = evidence.records.records[0].samples
+    rng = np.random.default_rng(every)
+    spectrum = np.fft.rfft(rng.standard_normal(samples))
+    spectrum[np.fft.rfftfreq(samples, 1.0 / RATE) > highest] = 0.0
+    change = np.fft.irfft(spectrum, samples)
+    parts = [i for i, part in enumerate(evidence.parts) if part.record == 0]
+    full = evidence.changes({0: change}, parts)
+    blocks = change[: samples // every * every].reshape(-1, every).mean(axis=1)
+    averaged = evidence.changes({0: blocks}, parts, every)
+    assert np.abs(averaged - full).max() < 0.04 * np.abs(full).max()
+
+
+@pytest.mark.parametrize("hop", [8, 30, 160, 1806, 4000])
+@pytest.mark.parametrize("lines", [1, 7, 90])
+def test_averages_keep_eight_samples_in_a_period_and_an_even_hop(hop, lines):
+    every = _averaged(hop, lines)
+    assert every >= 1 and hop % (2 * every) == 0
+    assert every == 1 or 2 * hop / every >= 8 * lines

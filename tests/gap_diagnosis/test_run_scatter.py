@@ -16,13 +16,13 @@ from fjr_records.records import Record, RecordSet
 from fjr_sim_node import effects as fx
 from fjr_sim_node.plant import PLANT, coefficients
 from fjr_sim_node.simulation.closed_loop import simulate
-from gap_diagnosis.gates.bag_deviations import deviations, record_errors
-from gap_diagnosis.gates.bags_gate import as_bags, drift_of_runs, record_changes, scattering
+from gap_diagnosis.gates.bag_deviations import deviations, run_errors
+from gap_diagnosis.gates.bags_gate import as_bags, drift_of_runs, run_changes, scattering
 from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.model.rig_model import Model
 from gap_diagnosis.outcome.diagnosis import Bags, Estimate
 from gap_diagnosis.report.randomisation import randomisation_yaml, ranges
-from gap_diagnosis.which.cell_fits import CellFit
+from gap_diagnosis.which.comparison import CellFit
 from gap_diagnosis.which.estimates import moved_by_scatter
 from gap_diagnosis.which.least_squares import Solution
 from gap_diagnosis.which.search_space import Space
@@ -86,7 +86,7 @@ def weighed(records: RecordSet):
 
 def changes_of(records: RecordSet):
     evidence, model, variance = weighed(records)
-    return record_changes(evidence, variance, model)
+    return run_changes(evidence, variance, model), evidence
 
 
 def drawn_scatter(factors: np.ndarray) -> np.ndarray:
@@ -101,7 +101,7 @@ def test_scatter_of_friction_is_found_and_that_of_stiffness_is_none(share):
     held = []
     for seed in range(3):
         records, factors = recorded(share, seed)
-        found = as_bags(changes_of(records), 0.0).scatter_percent
+        found = as_bags(*changes_of(records)).scatter_percent
         did = dict(zip(FRICTION, drawn_scatter(factors), strict=True))
         for name in WELL_SEEN:
             assert found[name].value == pytest.approx(did[name], rel=0.25, abs=0.25)
@@ -115,7 +115,7 @@ def test_the_deviation_of_each_run_is_as_uncertain_as_it_says():
     for seed in range(3):
         records, factors = recorded(0.03, 20 + seed)
         evidence, model, variance = weighed(records)
-        errors, blocks = record_errors(evidence, variance)
+        errors, blocks = run_errors(evidence, variance)
         found = deviations(errors, len(factors), model, blocks)
         assert found.names[:4] == list(FRICTION)
         std = np.sqrt(np.diagonal(found.covariance, axis1=1, axis2=2))
@@ -126,24 +126,22 @@ def test_the_deviation_of_each_run_is_as_uncertain_as_it_says():
 def test_a_steady_rig_whose_law_is_not_quite_the_model_scatters_nowhere():
     """What a wrong law leaves is alike in all runs, and differs from block to block."""
     records, _ = recorded(0.0, 5, {"cogging.amplitude_nm": 0.3, "cogging.cycles_per_turn": 40.0})
-    changes = changes_of(records)
+    changes, evidence = changes_of(records)
     assert scattering(changes) == ""
-    assert drift_of_runs(changes, 2 * RUNS) == ""
+    assert drift_of_runs(as_bags(changes, evidence)) == ""
 
 
 def test_friction_that_rises_from_run_to_run_is_a_trend_and_one_that_scatters_is_none():
     """Levels are recorded one after the other, so their friction differs as a trend's does."""
     runs = len(LEVELS_RAD) * RUNS
     rising = np.linspace(-0.1, 0.1, runs)
-    changes = changes_of(recorded(0.02, 3, rising=rising)[0])
-    said = drift_of_runs(changes, runs)
+    bags = as_bags(*changes_of(recorded(0.02, 3, rising=rising)[0]))
+    said = drift_of_runs(bags)
     assert said.startswith("In the order of the runs friction follows a trend")
     assert "interleaved" in said
-    assert as_bags(changes, runs - 1.0).trends["friction"].change_percent == pytest.approx(
-        20, abs=5
-    )
+    assert bags.trends["friction"].change_percent == pytest.approx(20, abs=5)
     for seed in range(3):
-        assert drift_of_runs(changes_of(recorded(0.02, seed)[0]), runs) == ""
+        assert drift_of_runs(as_bags(*changes_of(recorded(0.02, seed)[0]))) == ""
 
 
 NOTHING = Bags(trends={}, scatter_percent={}, accounted=1.0)
@@ -223,7 +221,7 @@ def test_ranges_hold_the_runs_of_a_rig_that_scatters():
     records, factors = recorded(0.05, 7)
     truth = {n: PLANT[n].default for n in WELL_SEEN}
     found = {n: Estimate(value=v, low=0.99 * v, high=1.01 * v) for n, v in truth.items()}
-    each = ranges(found, as_bags(changes_of(records), 0.0))
+    each = ranges(found, as_bags(*changes_of(records)))
     inside = [
         each[n].low <= f * truth[n] <= each[n].high
         for row in factors

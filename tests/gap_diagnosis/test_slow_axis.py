@@ -13,8 +13,8 @@ from fjr_records.records import Record, RecordSet
 from fjr_sim_node import effects as fx
 from fjr_sim_node.plant import coefficients
 from fjr_sim_node.simulation.closed_loop import simulate_law
+from gap_diagnosis.any_record import investigate
 from gap_diagnosis.model.nominal import datasheet
-from gap_diagnosis.record_investigation import investigate_records
 
 RATE, SECONDS = 125.0, 40.0
 GRAVITY, COULOMB = 35.0, 7.0
@@ -50,7 +50,7 @@ def moved(seed: int) -> RecordSet:
 
 
 def test_gravity_and_all_friction_are_named_with_their_sizes():
-    found = investigate_records(moved(30), datasheet({"jm": 2.2}, "axis"), effects=LOOKED_FOR)
+    found = investigate(moved(30), datasheet({"jm": 2.2}, "axis"), effects=LOOKED_FOR)
     sizes = {n: v for cause in found.diagnosis.causes for n, v in cause.parameters.items()}
     named = {cause.effect: cause.present for cause in found.diagnosis.causes}
     assert set(named) == {"gravity", "coulomb_friction", "viscous_friction", "load_friction"}

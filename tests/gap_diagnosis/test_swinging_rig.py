@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from test_evidence import NOMINAL, RATE, records
 
+from gap_diagnosis.any_record import investigate
 from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.model.record_loop import SWINGS, accounted_for
 from gap_diagnosis.model.rig_model import Model
-from gap_diagnosis.record_investigation import investigate_records
 
 DELAY_S = 6e-3
 
@@ -24,7 +24,7 @@ def swinging():
 def test_a_rig_that_its_delay_makes_swing_is_given_that_delay(swinging):
     """Ten times the reference, and where in its cycle it is no simulated loop repeats."""
     assert max(accounted_for(record, RATE) for record in swinging.records) < SWINGS
-    found = investigate_records(swinging, NOMINAL, effects=("delay", "actuator_lag", "extra_mode"))
+    found = investigate(swinging, NOMINAL, effects=("delay", "actuator_lag", "extra_mode"))
     (cause,) = found.diagnosis.causes
     assert cause.effect == "delay" and cause.present > 0.9
     assert cause.parameters["delay.time_s"].value == pytest.approx(DELAY_S, rel=0.01)

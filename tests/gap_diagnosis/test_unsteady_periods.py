@@ -16,9 +16,10 @@ from fjr_records.periodic import RecordedExperiment
 from fjr_sim_node import effects as fx
 from fjr_sim_node.plant import PLANT, coefficients
 from fjr_sim_node.simulation.closed_loop import simulate
-from gap_diagnosis.any_record import UNSTEADY, investigate_any
-from gap_diagnosis.investigation import investigate
-from gap_diagnosis.record_investigation import RecordInvestigation
+from gap_diagnosis.any_record import investigate
+from gap_diagnosis.gates.gate_checks import check_gates
+from gap_diagnosis.model.rig_model import Model
+from gap_diagnosis.steady_periods import UNSTEADY
 
 WARMING = {"nonstationary.friction_per_s": -0.02}
 LAG_S = 1e-3
@@ -52,10 +53,9 @@ def warming_anew(
 
 def test_a_cause_is_named_beside_a_drift_within_each_run():
     recorded = warming_anew({"actuator_lag.time_constant_s": LAG_S})
-    steady = investigate(recorded, PLANT.defaults(), effects=KNOWN)
-    assert steady.diagnosis.verdict == "nonstationary" and steady.gates.only_unsteady
-    found = investigate_any(recorded, PLANT.defaults(), effects=KNOWN)
-    assert isinstance(found, RecordInvestigation)
+    gates = check_gates(recorded, Model.nominal(PLANT.defaults()))
+    assert gates.hint == "nonstationary" and gates.only_unsteady
+    found = investigate(recorded, PLANT.defaults(), effects=KNOWN)
     diagnosis = found.diagnosis
     assert diagnosis.effects == ["actuator_lag"] and diagnosis.notes[0] == UNSTEADY
     assert any("drifts within bags" in note for note in diagnosis.notes)
@@ -64,7 +64,7 @@ def test_a_cause_is_named_beside_a_drift_within_each_run():
 
 
 def test_a_drift_beside_which_nothing_is_found_stays_the_verdict():
-    diagnosis = investigate_any(warming_anew({}), PLANT.defaults(), effects=KNOWN).diagnosis
+    diagnosis = investigate(warming_anew({}), PLANT.defaults(), effects=KNOWN).diagnosis
     assert diagnosis.verdict == "nonstationary" and not diagnosis.causes
 
 
@@ -76,8 +76,8 @@ def test_a_record_that_is_damaged_is_not_searched():
     bad = replace(
         recorded, realizations=(replace(first, torque=torque), *recorded.realizations[1:])
     )
-    found = investigate_any(bad, PLANT.defaults(), effects=KNOWN)
-    assert not found.gates.only_unsteady and found.diagnosis.verdict == "bad_data"
+    found = investigate(bad, PLANT.defaults(), effects=KNOWN)
+    assert not found.steady.gates.only_unsteady and found.diagnosis.verdict == "bad_data"
 
 
 NO_FREE_LINES = {"grid": "full", "transient_periods": 1}
@@ -92,9 +92,9 @@ def test_a_drift_is_told_from_a_transient_where_no_line_is_free_of_excitation(an
         if anew
         else simulate_case(warming, seed=4, realizations=3, **{**SHORT, **NO_FREE_LINES}).recorded
     )
-    steady = investigate(recorded, PLANT.defaults(), effects=KNOWN)
-    assert steady.diagnosis.verdict == "bad_data" and steady.gates.only_unsteady
-    found = investigate_any(recorded, PLANT.defaults(), effects=KNOWN)
+    gates = check_gates(recorded, Model.nominal(PLANT.defaults()))
+    assert gates.hint == "bad_data" and gates.only_unsteady
+    found = investigate(recorded, PLANT.defaults(), effects=KNOWN)
     assert found.diagnosis.verdict == "nonstationary" and not found.diagnosis.causes
     assert "friction drifts within runs, by -" in found.diagnosis.notes[0]
     gap = found.diagnosis.gap
@@ -106,10 +106,11 @@ def test_a_transient_is_no_drift():
     recorded = simulate_case(
         seed=4, realizations=3, **{**SHORT, **NO_FREE_LINES, "transient_periods": 0}
     ).recorded
-    found = investigate_any(recorded, PLANT.defaults(), effects=KNOWN)
+    found = investigate(recorded, PLANT.defaults(), effects=KNOWN)
     assert found.diagnosis.verdict == "bad_data"
     assert any("still transient" in note for note in found.diagnosis.notes)
-    assert found.gates.gates[-1].name == "stationary within runs" and found.gates.gates[-1].passed
+    last = found.steady.gates.gates[-1]
+    assert last.name == "stationary within runs" and last.passed
 
 
 def test_a_drift_of_a_rigid_axis_is_told_from_a_transient():
@@ -120,7 +121,7 @@ def test_a_drift_of_a_rigid_axis_is_told_from_a_transient():
         **{**SHORT, **NO_FREE_LINES},
     ).recorded  # fmt: skip
     nominal = dict.fromkeys(PLANT.names, 0.0) | rigid | {"k0": math.inf}
-    found = investigate_any(recorded, nominal, effects=KNOWN)
-    assert found.gates.only_unsteady
-    assert found.gates.gates[-1].name == "stationary within runs"
+    found = investigate(recorded, nominal, effects=KNOWN)
+    assert found.steady.gates.only_unsteady
+    assert found.steady.gates.gates[-1].name == "stationary within runs"
     assert found.diagnosis.verdict == "nonstationary"

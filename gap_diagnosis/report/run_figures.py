@@ -1,4 +1,4 @@
-"""Figures of a diagnosis of records: error by band after each step, torque that the model lacks."""
+"""Figures of the runs of a diagnosis: error by band after each step, torque the model lacks."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from fjr_kit.figure_style import EXCITED, NOISE, ODD, SIGMA, WIDTH_IN, legend, log_values
 
-from ..how_far.record_comparison import RecordComparison
+from ..how_far.run_comparison import RunComparison
 from ..outcome.cause_words import two_digits
 from ..outcome.verdict_words import explanation
 from .gap_figures import LEVEL_COLORS
@@ -18,9 +18,7 @@ from .gap_figures import LEVEL_COLORS
 _STEPS = (NOISE, ODD, EXCITED, *LEVEL_COLORS[::-1])
 
 
-def record_figures(
-    found: Sequence[RecordComparison], *, known: bool
-) -> dict[str, Callable[[], Figure]]:
+def run_figures(found: Sequence[RunComparison], *, known: bool) -> dict[str, Callable[[], Figure]]:
     """Return what draws each figure by its name.
 
     Args:
@@ -33,7 +31,7 @@ def record_figures(
     }
 
 
-def draw_bands(found: Sequence[RecordComparison], *, known: bool) -> Figure:
+def draw_bands(found: Sequence[RunComparison], *, known: bool) -> Figure:
     """Draw the rms error in each band after each step, a row for each level."""
     rows = len(found)
     tall = 0.7 + 1.4 * rows
@@ -61,7 +59,7 @@ def draw_bands(found: Sequence[RecordComparison], *, known: bool) -> Figure:
     return figure
 
 
-def draw_missing_torque(found: Sequence[RecordComparison]) -> Figure:
+def draw_missing_torque(found: Sequence[RunComparison]) -> Figure:
     """Draw the torque that refit and best model lack over velocity and angle, by level."""
     tall = 4.0
     figure = Figure(figsize=(WIDTH_IN, tall))

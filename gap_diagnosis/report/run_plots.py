@@ -1,4 +1,4 @@
-"""Interactive plots of a diagnosis of records: over time, by band, missing torque, what was tried.
+"""Interactive plots of the runs: over time, by band, missing torque, what was tried.
 
 Colours and dashes of the models are those of the plots of steady periods.
 """
@@ -12,7 +12,7 @@ import numpy as np
 
 from fjr_kit.plots import PLAIN, SECONDS, Options, Plot, extremes, layout, numbers, stack, trace
 
-from ..how_far.record_comparison import RecordComparison
+from ..how_far.run_comparison import RunComparison
 from ..outcome.cause_words import known, two_digits
 from ..outcome.diagnosis import Candidate
 from ..outcome.verdict_words import explanation
@@ -23,16 +23,16 @@ _MINUS = "\N{MINUS SIGN}"
 _SIGMA = "\N{GREEK SMALL LETTER SIGMA}"
 
 
-def record_level_plots(found: RecordComparison, noise_known: bool) -> dict[str, Plot]:
+def run_level_plots(found: RunComparison, noise_known: bool) -> dict[str, Plot]:
     """Return the plots of a level by the identifier of their place in the page."""
     return {
-        "record-time": _time(found),
-        "record-bands": _bands(found, noise_known),
-        "record-torque": _torque(found),
+        "run-time": _time(found),
+        "run-bands": _bands(found, noise_known),
+        "run-torque": _torque(found),
     }
 
 
-def _time(found: RecordComparison) -> Plot:
+def _time(found: RunComparison) -> Plot:
     """Return y of rig and models, and what each model misses of y and of u.
 
     Where torques were compared, those of rig and models, what each misses, and y of the rig.
@@ -56,7 +56,7 @@ def _time(found: RecordComparison) -> Plot:
     return {"data": traces, "layout": stack(titles, [1.0, 1.0, 1.0], "time (s)")}
 
 
-def _torque_over_time(found: RecordComparison) -> Plot:
+def _torque_over_time(found: RunComparison) -> Plot:
     t, traces = found.time_s, []
     line: Options = {"dash": "solid", "width": 1.0, "at": SECONDS}
     x, y = extremes(t, found.torque["rig"])
@@ -75,7 +75,7 @@ def _torque_over_time(found: RecordComparison) -> Plot:
     return {"data": traces, "layout": stack(titles, [1.0, 1.0, 1.0], "time, mean (s)")}
 
 
-def _bands(found: RecordComparison, noise_known: bool) -> Plot:
+def _bands(found: RunComparison, noise_known: bool) -> Plot:
     """Return the rms error in each band after each step."""
     edges = found.edges_hz
     names = ["0 to " + two_digits(edges[1])]
@@ -104,7 +104,7 @@ def _bands(found: RecordComparison, noise_known: bool) -> Plot:
     return {"data": traces, "layout": axes}
 
 
-def _torque(found: RecordComparison) -> Plot:
+def _torque(found: RunComparison) -> Plot:
     """Return the torque that refit and best model lack, over velocity and over angle."""
     styles = (("refit", "refit", "--model"), ("explained", "best explanation", "--excited"))
     traces = []
@@ -142,8 +142,8 @@ def tried_plot(ranking: Sequence[Candidate]) -> Plot | None:
         note = f"{PLAIN}<extra>%{{fullData.name}}</extra>"
         options: Options = {"symbol": "circle", "size": 9, "hovertemplate": note}
         traces.append(trace(gains, at[chosen], f"step {step}", color, **options))
-    axes = layout("gain of log-likelihood per number, on data that select", "")
-    axes["xaxis"] |= {"zeroline": True, "zerolinecolor": "--muted"}
+    axes = layout("gain of log-likelihood of a block that selects (nats)", "")
+    axes["xaxis"] |= {"zeroline": True, "zerolinecolor": "--muted", "rangemode": "tozero"}
     axes["yaxis"] |= {
         "tickvals": numbers(at),
         "ticktext": [f"{len(c.effects)}: {explanation(c.effects[-1:])}" for c in shown],

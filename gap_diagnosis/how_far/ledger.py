@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from ..model.evidence import Evidence
 from ..model.rig_model import Model
-from ..outcome.diagnosis import Figure, Gap, Place, Remainder, Stage, Step
+from ..outcome.diagnosis import Figure, Gap, Place, Remainder, Stage, StageFigures, Step
 from ..where.remainder import looks_like
+from .bootstrap import Choice, stage_figures
 
 _DRAWS = 1000
 _MOST_PLACES = 4
@@ -24,6 +25,7 @@ class Ledger:
         self.evidence = evidence
         self.parts = tuple(evidence.reporting if parts is None else parts)
         self.runs = sorted({evidence.parts[p].record for p in self.parts})
+        self._played: list[tuple[Model, np.ndarray, list[np.ndarray]]] = []
         self._part = evidence.part_of(self.parts)
         energy = [self._energy(i) for i in range(len(evidence.records.records))]
         of_part = np.array([energy[part.record] for part in evidence.parts])
@@ -41,42 +43,88 @@ class Ledger:
         held = np.abs(self.evidence.simulator.response(np.zeros(1), index))
         return max(float(np.mean(record.torque**2) / held[0] ** 2), 1e-300)
 
+    def _errors_and_runs(self, model: Model) -> tuple[np.ndarray, list[np.ndarray]]:
+        """Return the errors of a model on the parts, and its runs; what was played is kept."""
+        for played, errors, runs in self._played:
+            if played is model:
+                return errors, runs
+        evidence = self.evidence
+        runs = evidence.simulator.run([model], self.runs)[0]
+        lines = {i: evidence.lines_of(run[0], i) for i, run in zip(self.runs, runs, strict=True)}
+        cut = (evidence.parts[p] for p in self.parts)
+        errors = np.concatenate([lines[part.record][part.windows].ravel() for part in cut])
+        self._played.append((model, errors, runs))
+        return errors, runs
+
     def squares(self, model: Model) -> np.ndarray:
         """Return the squared error over the squared motion of each part, (parts,)."""
-        errors = self.evidence.errors([model], self.parts)[0]
+        return self._by_part(self._errors_and_runs(model)[0] ** 2 / self._scale)
+
+    def _by_part(self, squares: np.ndarray) -> np.ndarray:
         place = {part: k for k, part in enumerate(self.parts)}
         part = np.array([place[p] for p in self._part])
         windows = np.array([self.evidence.windows(p) for p in self.parts])
-        return np.bincount(part, errors**2 / self._scale) / windows
+        return np.bincount(part, squares) / windows
+
+    def torque_squares(self, model: Model) -> np.ndarray:
+        """Return the squared error of the torque over its mean square of each part, (parts,)."""
+        evidence = self.evidence
+        runs = dict(zip(self.runs, self._errors_and_runs(model)[1], strict=True))
+        found = []
+        for part in (evidence.parts[p] for p in self.parts):
+            torque = evidence.records.records[part.record].torque
+            at = slice(part.windows.start * evidence.hop, (part.windows.stop + 1) * evidence.hop)
+            error = float(np.mean((runs[part.record][1][at] - torque[at]) ** 2))
+            found.append(error / max(float(np.var(torque)), 1e-300))
+        return np.array(found)
 
     def step(self, model: Model, added: str | None, stage: Stage) -> Step:
         """Return the gap of a model."""
         evidence = self.evidence
-        errors = evidence.errors([model], self.parts)[0]
-        runs = evidence.simulator.run([model], self.runs)[0]
-        torque = [
-            float(np.mean((run[1] - r.torque) ** 2) / max(float(np.var(r.torque)), 1e-300))
-            for run, r in zip(runs, (evidence.records.records[i] for i in self.runs), strict=True)
-        ]
-        chi2 = float(np.mean(errors**2 / self._floor)) if evidence.noise.known else math.nan
+        chi2 = math.nan
+        if evidence.noise.known:
+            chi2 = float(np.mean(self._errors_and_runs(model)[0] ** 2 / self._floor))
         missed = float(np.sqrt(np.mean(self.squares(model))))
+        torque = float(np.sqrt(np.mean(self.torque_squares(model))))
         return Step(
             added=added,
             stage=stage,
             nrmse_position=None if evidence.slow else missed,
-            nrmse_torque=missed if evidence.slow else float(np.sqrt(np.mean(torque))),
+            nrmse_torque=missed if evidence.slow else torque,
             chi2_per_dof=chi2,
         )
+
+    def figures(self, stages: Mapping[str, Model], closes: bool) -> dict[str, StageFigures]:
+        """Return position and torque at each stage, with 95 % intervals.
+
+        Args:
+            stages: model by stage: nominal, refit, explained.
+            closes: whether a cause was added, so that a share of the gap closed can be stated.
+        """
+        levels = np.array([self.evidence.parts[p].level for p in self.parts])
+        choice = Choice.among(range(levels.size), levels)
+        squares = {stage: self.squares(model) for stage, model in stages.items()}
+        if self.evidence.slow:
+            return {"torque": stage_figures(squares, None, choice, closes)}
+        torque = {stage: self.torque_squares(model) for stage, model in stages.items()}
+        noise = self._noise() if self.evidence.noise.known else None
+        return {
+            "position": stage_figures(squares, noise, choice, closes),
+            "torque": stage_figures(torque, None, choice, closes),
+        }
+
+    def _noise(self) -> np.ndarray:
+        """Return the squared position that noise alone leaves of each part, (parts,)."""
+        power = self.evidence.noise_power[self.evidence.cell_of(self.parts)]
+        return self._by_part(power / self._scale)
 
     def noise(self) -> Gap | None:
         """Return the gap that noise alone leaves; None where it is not known."""
         evidence = self.evidence
         if not evidence.noise.known:
             return None
-        each = evidence.noise_power[evidence.cell_of(self.parts)] / self._scale
-        windows = sum(evidence.windows(p) for p in self.parts)
         return Gap(
-            nrmse_position=float(np.sqrt(np.sum(each) / windows)),
+            nrmse_position=float(np.sqrt(np.mean(self._noise()))),
             nrmse_torque=None,
             chi2_per_dof=1.0,
         )
@@ -105,7 +153,7 @@ class Ledger:
 
     def places_of_error(self, model: Model) -> list[Place]:
         """Return where a model errs."""
-        errors = self.evidence.errors([model], self.parts)[0]
+        errors = self._errors_and_runs(model)[0]
         squares = self.evidence.mean_squares(errors, self.parts)
         return self.places(np.sqrt(squares / self.evidence.floor(self.parts)))
 

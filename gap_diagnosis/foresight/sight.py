@@ -1,4 +1,4 @@
-"""Records: what a change of the model would change of the evidence in windows and lines."""
+"""What a change of the model would change of the evidence in windows and lines."""
 
 from __future__ import annotations
 
@@ -7,38 +7,50 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.optimize import brentq
+from scipy.stats import chi2
 
 from fjr_records.records import RecordSet
 
 from ..model.evidence import Evidence
 from ..model.rig_model import Model
+from ..which.comparison import CHANCE, NOTHING_LEFT
 from ..which.gains import LEAST_GAIN
 from ..which.scales import Scales
-from ..which.stepwise import NOTHING_LEFT
 
+_FARTHEST = 30.0  # logarithm of the factors within which a size is looked for
 RECORDS = 3
 """Records of each level that are simulated: one for each purpose of a diagnosis."""
 
 
-class RecordSight:
-    """What records show.
+class Sight:
+    """What runs show.
 
     Attributes:
+        levels: names of their levels.
         scales: what is usual in them.
         noise_known: whether their noise is known.
     """
 
-    def __init__(self, records: RecordSet, nominal: Model, realizations: int | None = None) -> None:
-        """Take records.
+    def __init__(
+        self,
+        records: RecordSet,
+        nominal: Model,
+        levels: Sequence[str],
+        realizations: int | None = None,
+    ) -> None:
+        """Take runs.
 
         Args:
             records: at least those that stand for all.
             nominal: the bare plant.
+            levels: their names.
             realizations: how many each level will have; None for those that are there.
 
         Raises:
             InputError: a controller that is described badly.
         """
+        self.levels = tuple(levels)
         members = {at: [r for r in records.records if r.level == at] for at in records.levels}
         chosen = [r for runs in members.values() for r in runs[:RECORDS]]
         records = replace(records, records=tuple(chosen))
@@ -50,7 +62,7 @@ class RecordSight:
             [r.position for r in chosen],
             [r.torque for r in chosen],
             records.sample_rate_hz,
-            self._evidence.lines * self._evidence.line_hz,
+            self._evidence.band_hz,
             nominal.plant,
         )
         fitted = self._evidence.parts_for("fit")
@@ -63,14 +75,13 @@ class RecordSight:
         self._levels_of = np.array([p.level for p in self._evidence.parts])[part]
         self._judged = np.isin(part, judged)
         bands = self._evidence.bands
-        _, self._bins = np.unique(part[self._judged] * bands + cell[self._judged] % bands,
-                                  return_inverse=True)  # fmt: skip
+        own = part[self._judged] * bands + cell[self._judged] % bands
+        bins, self._bins = np.unique(own, return_inverse=True)
+        self._counts = np.bincount(self._bins)
+        level = np.array([p.level for p in self._evidence.parts])[bins // bands]
+        _, self._cells = np.unique(level * bands + bins % bands, return_inverse=True)
+        self._numbers = np.bincount(self._cells, self._counts)
         self._count = len(judged)
-
-    @property
-    def levels(self) -> tuple[str, ...]:
-        """Names of the levels."""
-        return tuple(f"level {level}" for level in self._evidence.records.levels)
 
     def errors(self, models: Sequence[Model]) -> np.ndarray:
         """Return errors over their standard deviation, float64 (models, errors)."""
@@ -82,17 +93,28 @@ class RecordSight:
         return any(simulator.too_stiff(model, i) for i in range(len(simulator.records.records)))
 
     def strength(self, change: np.ndarray) -> float:
-        """Return how far a change shows, over what the diagnosis needs to name an effect.
+        """Return how many times smaller a change may be for a diagnosis still to name an effect.
 
-        Two things are needed (`stepwise`): without the effect, more than noise must be left, and an
-        unseen part must gain enough log-likelihood by it, of which each band has
-        n/2 ln(1 + mean square of the change over that of noise).
+        Two things are needed (`stepwise`): without the effect, more than noise must be left in some
+        band of a level, and an unseen part must gain enough log-likelihood by it, of which each
+        band has n/2 ln(1 + mean square of the change over that of noise).
         """
-        counts = np.bincount(self._bins)
-        squares = np.bincount(self._bins, change[self._judged] ** 2) / counts
-        gain = 0.5 * float(np.sum(counts * np.log1p(squares))) / self._count
-        left = float(np.mean(change[self._judged] ** 2))
-        return math.sqrt(min(gain / LEAST_GAIN, left / (NOTHING_LEFT - 1.0)))
+        squares = np.bincount(self._bins, change[self._judged] ** 2) / self._counts
+        totals = np.bincount(self._cells, squares * self._counts) / self._numbers
+        beyond = np.maximum(NOTHING_LEFT, chi2.isf(CHANCE, self._numbers) / self._numbers) - 1.0
+        left = math.sqrt(max(float((totals / beyond).max()), 0.0))
+        if not np.isfinite(squares).all():
+            return math.inf
+
+        def lacks(logarithm: float) -> float:
+            smaller = squares * math.exp(-2.0 * logarithm)
+            return LEAST_GAIN - 0.5 * float(self._counts @ np.log1p(smaller)) / self._count
+
+        low, high = -_FARTHEST, _FARTHEST
+        if lacks(low) > 0.0:
+            return 0.0
+        gained = math.exp(high if lacks(high) < 0.0 else brentq(lacks, low, high, xtol=1e-6))
+        return min(gained, left)
 
     def best_level(self, change: np.ndarray) -> int:
         """Return the index of the level at which a change shows best."""

@@ -30,7 +30,7 @@ class Curve:
 
 
 @dataclass(frozen=True)
-class RecordComparison:
+class RunComparison:
     """One level of records.
 
     Attributes:
@@ -59,9 +59,9 @@ class RecordComparison:
     compared: Literal["motion", "torque"] = "motion"
 
 
-def compare_records(
+def compare_runs(
     evidence: Evidence, parts: tuple[int, ...], models: Mapping[str, Model]
-) -> list[RecordComparison]:
+) -> list[RunComparison]:
     """Compare records with models, level by level.
 
     Args:
@@ -99,7 +99,7 @@ def _compare(
     models: Mapping[str, Model],
     row: int,
     errors: Mapping[str, np.ndarray],
-) -> RecordComparison:
+) -> RunComparison:
     level = evidence.records.levels[row]
     index = next(evidence.parts[p].record for p in parts if evidence.parts[p].level == level)
     record = evidence.records.records[index]
@@ -115,7 +115,7 @@ def _compare(
         if name != "nominal"
     }
     lacking = {name: uniform_filter1d(torque, smooth) for name, torque in lacking.items()}
-    return RecordComparison(
+    return RunComparison(
         level=level,
         name=record.name,
         time_s=np.arange(record.samples) / rate,
