@@ -72,7 +72,7 @@ def test_a_small_offset_is_there_on_runs_whose_friction_differs(monkeypatch):
     bias, shown = {"torque_bias.torque_nm": 0.01}, {True: 0, False: 0}
     for beside in shown:
         if not beside:
-            monkeypatch.setattr("gap_diagnosis.which.cell_fits.deviated", lambda model: [])
+            monkeypatch.setattr("gap_diagnosis.which.comparison.deviated", lambda model: [])
         for seed in range(4):
             evidence = Evidence(records(bias, runs=2, scatter=0.05, seed=seed), NOMINAL)
             fitter = CellFitter(evidence, NOMINAL, 0.1)
