@@ -17,11 +17,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .how_far.ledger import Ledger
-from .judgement import FEWEST_PARTS, PLAIN
+from .judgement import FEWEST_PARTS, PLAIN, gaps_of, verdict_of
 from .model.evidence import Evidence
 from .model.rig_model import Model
 from .notes import rounding
-from .outcome.diagnosis import Cause, Diagnosis, Estimate, Gap, GapFigures, Gaps, Step, Verdict
+from .outcome.diagnosis import Cause, Diagnosis, Estimate, GapFigures, Step
 from .outcome.verdict_words import ROUNDING
 from .which.cell_fits import CellFitter
 from .which.comparison import NOTHING_LEFT, CellFit
@@ -169,21 +169,18 @@ def _told(
         *(alone.step(fit.model, fit.effects[-1], "cause") for fit in fits[1:-1]),
         ledger.step(rounded, ROUNDING, "cause"),
     ]
-    ends = {"nominal": steps[0], "refit": steps[1], "explained": steps[-1]}
     models = {"nominal": nominal, "refit": refit, "explained": rounded}
     figures = GapFigures(**ledger.figures(models, closes=bool(diagnosis.causes)))
     closed = None if figures.position is None else figures.position.closed
     told = {
-        "verdict": _verdict(causes, steps[-1]),
+        "verdict": verdict_of(causes, steps, evidence, thin=False),
         "effects": [one.effect for one in causes],
         "equivalent": [[one.effect, *one.others] for one in causes],
         "confidence": min(one.present for one in causes),
         "causes": causes,
         "steps": steps,
         "remainder": ledger.remainder(rounded, refit),
-        "gap": Gaps(
-            **{name: _gap(step) for name, step in ends.items()}, noise_floor=ledger.noise()
-        ),
+        "gap": gaps_of(steps, ledger.noise()),
         "gap_closed": None if closed is None else closed.value,
         "gap_figures": figures,
         "where": alone.places_of_error(refit),
@@ -197,20 +194,6 @@ def _known(rounded: Model) -> dict[str, Estimate]:
     """Return the step of the encoder, which the record shows as it is."""
     step = rounded.effects[STEP]
     return {STEP: Estimate(value=step, low=(1.0 - _OFF) * step, high=(1.0 + _OFF) * step)}
-
-
-def _gap(step: Step) -> Gap:
-    return Gap(
-        nrmse_position=step.nrmse_position,
-        nrmse_torque=step.nrmse_torque,
-        chi2_per_dof=step.chi2_per_dof,
-    )
-
-
-def _verdict(causes: Sequence[Cause], last: Step) -> Verdict:
-    if last.chi2_per_dof is None or not last.chi2_per_dof < NOTHING_LEFT:
-        return "partly_explained"
-    return "ambiguous" if any(cause.others for cause in causes) else "effect"
 
 
 def _note(ledger: Ledger, best: CellFit, rounded: Model, steps: Sequence[Step]) -> str:

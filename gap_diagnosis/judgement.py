@@ -95,16 +95,7 @@ def judge(
         ledger.step(refit.model, None, "refit"),
         *(ledger.step(fit.model, fit.effects[-1], "cause") for fit in found.steps[1:]),
     ]
-    verdict = _verdict(causes, steps, evidence, thin)
-    ends = {"nominal": steps[0], "refit": steps[1], "explained": steps[-1]}
-    gaps = {
-        name: Gap(
-            nrmse_position=s.nrmse_position,
-            nrmse_torque=s.nrmse_torque,
-            chi2_per_dof=s.chi2_per_dof,
-        )
-        for name, s in ends.items()
-    }
+    verdict = verdict_of(causes, steps, evidence, thin)
     models = {"nominal": nominal, "refit": refit.model, "explained": best.model}
     figures = GapFigures(**ledger.figures(models, closes=bool(causes)))
     main = figures.torque if figures.position is None else figures.position
@@ -123,7 +114,7 @@ def judge(
         causes=causes,
         steps=steps,
         remainder=ledger.remainder(best.model, refit.model),
-        gap=Gaps(**gaps, noise_floor=ledger.noise()),
+        gap=gaps_of(steps, ledger.noise()),
         gap_closed=None if main.closed is None else main.closed.value,
         gap_figures=figures,
         where=ledger.places_of_error(refit.model),
@@ -163,9 +154,31 @@ def _cause(
     )
 
 
-def _verdict(
+def gaps_of(steps: Sequence[Step], noise_floor: Gap | None) -> Gaps:
+    """Return the gaps of the datasheet, of the refit and of all causes, from the steps."""
+    ends = {"nominal": steps[0], "refit": steps[1], "explained": steps[-1]}
+    gaps = {
+        name: Gap(
+            nrmse_position=step.nrmse_position,
+            nrmse_torque=step.nrmse_torque,
+            chi2_per_dof=step.chi2_per_dof,
+        )
+        for name, step in ends.items()
+    }
+    return Gaps(**gaps, noise_floor=noise_floor)
+
+
+def verdict_of(
     causes: Sequence[Cause], steps: Sequence[Step], evidence: Evidence, thin: bool
 ) -> Verdict:
+    """Return the verdict on causes and the gap from step to step.
+
+    Args:
+        causes: that are named.
+        steps: nominal, refit, and with each cause.
+        evidence: the runs.
+        thin: whether too little is held out of the fits for any name.
+    """
     known = evidence.noise.known
     if causes:
         if known and _nothing_left(steps[1], steps[-1]):

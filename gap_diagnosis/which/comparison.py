@@ -22,9 +22,8 @@ from .unseen_friction import beside_scatter, deviated
 NOTHING_LEFT = 2.0
 """Mean squared error over noise below which noise explains what is left."""
 CHANCE = 1e-4  # that noise leaves as much in a band: then something else is left there
-_ACTS = (
-    0.1  # of what is left in a band of a part: an effect that moves it by less does not act there
-)
+_ACTS = 0.1
+"""Of what is left in a band of a part: an effect that moves it by less does not act there."""
 
 
 @dataclass(frozen=True)
