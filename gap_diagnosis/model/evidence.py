@@ -195,23 +195,46 @@ class Evidence:
 
         A model whose motion diverges has errors of 1e6 times the motion.
         """
-        needed = sorted({self.parts[i].record for i in which})
+        spans = self._spans(which)
         rows = []
-        for runs in self.simulator.run(models, needed):
+        for runs in self.simulator.run(models, list(spans)):
             lines = {
-                index: self.lines_of(run[0], index) for index, run in zip(needed, runs, strict=True)
+                index: self.lines_of(run[0], index, spans[index])
+                for index, run in zip(spans, runs, strict=True)
             }
-            pieces = [lines[self.parts[i].record][self.parts[i].windows].ravel() for i in which]
-            rows.append(np.concatenate(pieces))
+            rows.append(self._joined(lines, spans, which))
         return np.array(rows)
 
-    def lines_of(self, position: np.ndarray, index: int) -> np.ndarray:
+    def lines_of(
+        self, position: np.ndarray, index: int, windows: slice = slice(None)
+    ) -> np.ndarray:
         """Return the lines of the error of a simulated position of one record, (windows, lines)."""
         measured = self._measured[index][:, : self.lines]
         most = _DIVERGED * np.abs(measured).max()
         if not np.isfinite(position).all():
-            return np.full(measured.shape, most)
-        return np.clip(lapped(position, self.hop)[:, : self.lines] - measured, -most, most)
+            return np.full(measured[windows].shape, most)
+        lines = lapped(position[_samples_of(windows, self.hop)], self.hop)[:, : self.lines]
+        return np.clip(lines - measured[windows], -most, most)
+
+    def _spans(self, which: Sequence[int]) -> dict[int, slice]:
+        """Return the windows from the first to the last of some parts, by their records."""
+        spans: dict[int, slice] = {}
+        for part in sorted((self.parts[i] for i in which), key=lambda part: part.record):
+            now = spans.get(part.record, part.windows)
+            begin, end = min(now.start, part.windows.start), max(now.stop, part.windows.stop)
+            spans[part.record] = slice(begin, end)
+        return spans
+
+    def _joined(
+        self, lines: Mapping[int, np.ndarray], spans: Mapping[int, slice], which: Sequence[int]
+    ) -> np.ndarray:
+        """Return the numbers on parts, (numbers,), of lines in the spans of their records."""
+        pieces = []
+        for part in (self.parts[i] for i in which):
+            first = spans[part.record].start
+            own = lines[part.record][part.windows.start - first : part.windows.stop - first]
+            pieces.append(own.ravel())
+        return np.concatenate(pieces)
 
     def measured(self, which: Sequence[int]) -> np.ndarray:
         """Return the lines of what is compared, as it was measured, on parts, (errors,), rad.
@@ -237,9 +260,12 @@ class Evidence:
             every: a divisor of half the hop.
         """
         hop, scale = self.hop // every, np.sqrt(every)  # the transform is orthonormal
-        lines = {i: scale * lapped(p, hop)[:, : self.lines] for i, p in positions.items()}
-        pieces = [lines[self.parts[i].record][self.parts[i].windows].ravel() for i in which]
-        return np.concatenate(pieces)
+        spans = self._spans(which)
+        lines = {
+            index: scale * lapped(positions[index][_samples_of(span, hop)], hop)[:, : self.lines]
+            for index, span in spans.items()
+        }
+        return self._joined(lines, spans, which)
 
     def cell_of(self, which: Sequence[int]) -> np.ndarray:
         """Return the cell of each error on parts, int (errors,)."""
@@ -289,6 +315,13 @@ class Evidence:
         count = np.bincount(cell, minlength=self.cells)
         total = np.bincount(cell, values**2, self.cells)
         return total / np.maximum(count, 1)
+
+
+def _samples_of(windows: slice, hop: int) -> slice:
+    """Return the samples of some windows; of all, all."""
+    if windows.stop is None:
+        return slice(None)
+    return slice(windows.start * hop, (windows.stop + 1) * hop)
 
 
 def _edges(lines: int) -> np.ndarray:

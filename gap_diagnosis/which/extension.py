@@ -11,7 +11,7 @@ from fjr_sim_node import effects as fx
 from .cell_fits import CellFitter
 from .comparison import NOTHING_LEFT, CellFit
 from .equivalents import ONE_CAUSE, founded, holders, partners, plainness
-from .gains import Gain, gain, left_of, stands_for
+from .gains import NEARLY_ALL, Gain, gain, left_of, stands_for
 from .harmonics import WORTH_A_HARMONIC, with_second_harmonic
 from .screening import Proposal, Screening
 
@@ -21,8 +21,7 @@ beside no cause yet, beside others."""
 _POLISHED = 2  # leading fits of a step that are taken further
 _AGAIN = 8  # effects that are screened beside a cause, and those that depend on others
 _OUTDATED = 0.1  # of the squared error that is left: then what was screened before is too far
-_NEARLY_ALL, _MOST = 0.1, 0.5
-"""Of the squared error: what a fit leaves that closes nearly all, and one that leaves most."""
+_MOST = 0.5  # of the squared error: a fit that leaves more leaves most of it
 _MUCH_LESS = 0.3  # of the greatest gain: a cause that gains less waits for the next step
 _START_LESS = 0.2  # of the greatest gain of a start: an effect whose best one gains less waits
 
@@ -82,11 +81,7 @@ class Extension:
             fit = self._fitter.add(parent, effect, begun, _STARTS[later])
             if fit is not None:
                 fits.append(fit)
-        fits = self.ranked(fits, parent)
-        first = [fit.effects[-1] for fit in fits[:_POLISHED]]
-        near = len(partners(first[:1], set(first))) > 1
-        leading = [self._enriched(self._settled(f, parent, near), parent) for f in fits[:_POLISHED]]
-        return self.ranked([*leading, *fits[_POLISHED:]], parent)
+        return self._polished(self.ranked(fits, parent), parent)
 
     def tied(self, chosen: CellFit, fits: Sequence[CellFit], parent: CellFit) -> list[str]:
         """Return the effects that unseen parts cannot tell from the chosen one."""
@@ -114,7 +109,7 @@ class Extension:
             return None
         left = [left_of(self._fitter, fit, parent) for fit in present]
         nearly_all = present[int(np.argmin(left))]
-        if min(left) < _NEARLY_ALL and left_of(self._fitter, repeating[0], parent) > _MOST:
+        if min(left) < NEARLY_ALL and left_of(self._fitter, repeating[0], parent) > _MOST:
             return nearly_all
         first = repeating[0]
         worth = self.gain(first, parent).mean
@@ -141,6 +136,30 @@ class Extension:
         most = max(gains.values(), default=0.0)
         return [e for e in ordered if gains[e] >= _START_LESS * most]
 
+    def _polished(self, fits: Sequence[CellFit], parent: CellFit) -> list[CellFit]:
+        """Return ranked fits, those that lead and may be chosen taken further, ranked anew."""
+        leading = fits[:_POLISHED]
+        first = [fit.effects[-1] for fit in leading]
+        near = len(partners(first[:1], set(first))) > 1
+        promising = [fit for fit in leading if self._may_be_chosen(fit, leading[0], parent)]
+        if near and promising:
+            promising = list(leading)
+        others = [fit for fit in fits if not any(fit is one for one in promising)]
+        further = [self._enriched(self._settled(f, parent, near), parent) for f in promising]
+        return self.ranked([*further, *others], parent)
+
+    def _may_be_chosen(self, fit: CellFit, first: CellFit, parent: CellFit) -> bool:
+        """Tell whether a fit that leads may be chosen once it is taken further.
+
+        Not where it neither repeats on unseen parts nor closes much, or gains much less than the
+        first one.
+        """
+        left, found = left_of(self._fitter, fit, parent), self.gain(fit, parent)
+        if left < _OUTDATED:
+            return True
+        repeats = found.present or left < _MOST
+        return repeats and found.mean > _MUCH_LESS * self.gain(first, parent).mean
+
     def _settled(self, fit: CellFit, parent: CellFit, alike: bool) -> CellFit:
         """Return a fit that leads, taken to its end.
 
@@ -162,10 +181,13 @@ class Extension:
     def _enriched(self, fit: CellFit, parent: CellFit) -> CellFit:
         """Return a fit whose last effect is a ripple with its second harmonic, if that repeats.
 
-        A ripple of two harmonics that is taken for one leaves what looks like a further cause.
+        A ripple of two harmonics that is taken for one leaves what looks like a further cause. One
+        that does not repeat is no ripple.
         """
         effect = fit.effects[-1]
         if not fx.EFFECTS[effect].ripple or self._fitter.misfit(fit) < WORTH_A_HARMONIC:
+            return fit
+        if not self.gain(fit, parent).present:
             return fit
         self._progress(f"{' + '.join(fit.effects)}, second harmonic")
         richer = with_second_harmonic(self._fitter, fit, parent)

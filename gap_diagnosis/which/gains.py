@@ -27,6 +27,9 @@ TIED_P = 0.1
 _FEW = 5  # parts: of fewer no rank test is sure
 _COUNTED = 5.0  # nats, the most that one of few parts counts
 _NEUTRAL = 0.02  # of the greatest gain of a part: parts that change by less say nothing
+NEARLY_ALL = 0.1
+"""Of the squared error: what an explanation leaves that closes nearly all."""
+_HELD = 0.02  # of the squared error of the part that holds most: less is not what is closed
 
 
 @dataclass(frozen=True)
@@ -58,6 +61,9 @@ def gain(
 ) -> Gain:
     """Return what `after` gains over `before` on the parts that select.
 
+    What closes nearly all of the squared error must repeat where that is: a chirp shows a delay in
+    its fast half alone, and what the fit makes worse where hardly any error was says little.
+
     Args:
         fitter: that made both.
         after: the fit that may be better.
@@ -65,9 +71,11 @@ def gain(
         acts: bool (parts,), where it must repeat; None for all parts in which anything changes.
     """
     difference = fitter.gains(after, before)
-    telling = difference[np.abs(difference) >= _NEUTRAL * np.abs(difference).max()]
-    if acts is not None:
-        telling = difference[acts]
+    tells = np.abs(difference) >= _NEUTRAL * np.abs(difference).max() if acts is None else acts
+    if left_of(fitter, after, before) < NEARLY_ALL:
+        held = np.sum(fitter.weights.counts * before.left, axis=1)
+        tells = tells & (held >= _HELD * held.max())
+    telling = difference[tells]
     if difference.size < 2 or not telling.any():
         return Gain(float(difference.mean()), 0.0, 0.0, 1.0)
     most = int(np.argmax(difference))

@@ -3,7 +3,8 @@
 A ripple acts as a torque along the model's own motion. What it does to the position is predicted
 linearly, by the response of plant and controller (or observer), G/(1 + G C_y); so hundreds of
 numbers of ripples can be tried at once, and only the best are simulated. The torque is made at each
-sample and then averaged over as many as the lines of the evidence allow.
+sample and then averaged over as many as the lines of the evidence allow. Along a steady period it
+is periodic as the motion is; along any other record the response is that from rest.
 """
 
 from __future__ import annotations
@@ -20,12 +21,14 @@ from fjr_sim_node.theory.linear import g0
 
 from ..model.evidence import Evidence
 from ..model.rig_model import Model
+from ..model.steady_runs import SteadyRuns
 from .least_squares import Solution
 
 MOST_TRIED = 240
 _LEAST_FIRST = 0.1  # of the second harmonic: a smaller first one is no ripple of that number
 _FREE_HZ = 1e-3  # below, a free body has no response
 _LEAST_RATE = 8  # samples in a period of the highest line: averaging takes off 3 % there
+_FORGOTTEN = 1e-6  # of the energy of an impulse response: what is left of it then is no memory
 
 
 class Ripples:
@@ -50,17 +53,24 @@ class Ripples:
         """
         self._evidence, self._parts, self._weight = evidence, tuple(parts), weight
         self._runs = sorted({evidence.parts[i].record for i in parts})
-        motion = evidence.simulator.run([model], self._runs)[0]
+        records = evidence.records
+        self._run_in = records.run_in if isinstance(records, SteadyRuns) else 0
+        whole = evidence.simulator.run([model], self._runs)[0]
+        motion = [run[:, self._run_in :] for run in whole]
         self._motor = [run[0] for run in motion]
         self._torque = [run[1].astype(np.float32) for run in motion]
         self._twist = [(run[2] - run[0]).astype(np.float32) for run in motion]
         self._direction = [np.sign(np.gradient(run[0])).astype(np.float32) for run in motion]
-        self._every = _averaged(evidence.hop, evidence.lines)
+        self._every = _averaged(evidence.hop, evidence.lines, self._whole_blocks())
         self._responses = [self._response(model, index, run.size // self._every) for index, run
                            in zip(self._runs, self._motor, strict=True)]  # fmt: skip
         self._basis = np.linalg.qr(parent.jacobian)[0]
         self._left = self._beyond(parent.residuals)
         self._stiffness = model.plant.get("k0", 0.0)
+
+    def _whole_blocks(self) -> int:
+        """Return how many samples averages must divide: those of a steady period; 0 for any."""
+        return math.gcd(self._run_in, self._motor[0].size) if self._run_in else 0
 
     def cycles(self, effect: str, tried: np.ndarray, most: int) -> list[float]:
         """Return the numbers of cycles per turn that promise most, best first.
@@ -136,18 +146,27 @@ class Ripples:
         count, samples = len(torques), torques.shape[1] // self._every
         blocks = torques[:, : samples * self._every].reshape(count, samples, self._every)
         averaged = blocks @ np.full(self._every, 1.0 / self._every, np.float32)
-        response, size = self._responses[k], 2 * (self._responses[k].shape[1] - 1)
+        response, size = self._responses[k], self._size(k, samples)
         spectra = rfft(averaged, size).reshape(-1, 2, response.shape[1])
-        moved = np.einsum("fnl,fl->nl", spectra, response[: len(spectra)])
-        return irfft(moved, size)[:, :samples]
+        moved = irfft(np.einsum("fnl,fl->nl", spectra, response[: len(spectra)]), size)
+        return np.pad(moved[:, :samples], ((0, 0), (self._run_in // self._every, 0)))
 
     def _response(self, model: Model, index: int, samples: int) -> np.ndarray:
         """Return position per torque on the motor, and per torque between link and motor.
 
         Returns:
-            complex (2, lines), at the lines of a padded record.
+            complex (2, lines), at the lines of a steady period, or of a record that is padded by
+            what the loop remembers.
         """
-        size = 2 * next_fast_len(samples, real=True)
+        if self._run_in:
+            return self._response_of(model, index, samples)
+        whole = self._response_of(model, index, 2 * next_fast_len(samples, real=True))
+        memory = max(_memory(irfft(row)[:samples]) for row in whole)
+        return self._response_of(
+            model, index, 2 * next_fast_len((samples + memory + 1) // 2, real=True)
+        )
+
+    def _response_of(self, model: Model, index: int, size: int) -> np.ndarray:
         rate = self._evidence.records.sample_rate_hz
         frequency = np.maximum(rfftfreq(size, self._every / rate), _FREE_HZ)
         plant_response = g0(model.whole_plant, frequency, rate)
@@ -155,6 +174,10 @@ class Ripples:
         response = plant_response / (1.0 + plant_response * holds)
         pair = np.array([np.ones(frequency.size), of_pair(model.plant, frequency)])
         return (response * pair).astype(np.complex64)
+
+    def _size(self, k: int, samples: int) -> int:
+        """Return of how many samples the transforms of a record are."""
+        return samples if self._run_in else 2 * (self._responses[k].shape[1] - 1)
 
     def _beyond(self, errors: np.ndarray) -> np.ndarray:
         """Return what the parent's parameters can't follow of errors, (errors,)."""
@@ -174,15 +197,23 @@ def _peaks(gains: np.ndarray) -> np.ndarray:
     return np.asarray(peaks[np.argsort(-gains[peaks])])
 
 
-def _averaged(hop: int, lines: int) -> int:
+def _averaged(hop: int, lines: int, whole: int = 0) -> int:
     """Return over how many samples a signal may be averaged whose lines above `lines` don't count.
 
     Args:
         hop: of the lapped transform, samples; still an even number of averages.
         lines: that count.
+        whole: samples that are a whole number of averages as well.
     """
     most = max(2 * hop // (_LEAST_RATE * lines), 1)
-    return next(every for every in range(most, 0, -1) if hop % (2 * every) == 0)
+    fits = (e for e in range(most, 0, -1) if hop % (2 * e) == 0 and whole % e == 0)
+    return next(fits)
+
+
+def _memory(impulse: np.ndarray) -> int:
+    """Return after how many samples an impulse response is forgotten."""
+    left = np.cumsum(impulse[::-1].astype(np.float64) ** 2)[::-1]
+    return int(np.count_nonzero(left > _FORGOTTEN * left[0]))
 
 
 def waves(cycles: float, angle: np.ndarray) -> np.ndarray:

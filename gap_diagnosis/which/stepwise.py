@@ -82,7 +82,9 @@ class Stepwise:
             if fits and self._over:
                 found.complete = False
                 return False
-            fits = look(fits, found) or fits
+            if not (new := look(fits, found)):
+                continue
+            fits = new
             if (chosen := self._repeating(fits, found)) is not None:
                 found.alternatives[chosen.effects[-1]] = self.extension.tied(
                     chosen, fits, found.best

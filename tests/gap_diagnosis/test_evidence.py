@@ -163,6 +163,18 @@ def test_an_effect_must_repeat_only_where_it_acts():
     assert where_it_acts.present and where_it_acts.p == 0.5 ** np.sum(levels == 1)
 
 
+@pytest.mark.parametrize(("left", "present"), [(0.01, True), (0.5, False)])
+def test_what_closes_nearly_all_of_the_error_must_repeat_where_that_is(left, present):
+    """A chirp shows a delay in its fast half; elsewhere a refit did a little better."""
+    fitter, refit, fit = biased()
+    parts = len(fitter.select_parts)
+    much = np.arange(parts) % 2 == 0
+    before = np.where(much, 1e3, 1.0)[:, None] * np.ones_like(refit.left)
+    after = before * np.where(much, left, 1.6)[:, None]
+    changed = replace(refit, left=before), replace(fit, left=after)
+    assert gain(fitter, changed[1], changed[0]).present == present
+
+
 def test_a_leading_fit_is_taken_to_its_end_before_it_is_compared(monkeypatch):
     monkeypatch.setattr("gap_diagnosis.which.cell_fits._ADDED_ROUNDS", (3,))
     limit = {"torque_saturation.limit_nm": 60.0}
