@@ -21,7 +21,7 @@ _TITLES = {
     "auroc_present": "AUROC of present, right against wrong",
     "verdict_right": "exactly the dominant causes named",
     "failed": "failed",
-    "seconds_median": "median time of one case in one thread (s)",
+    "seconds_median": "median processor time of one case (s)",
 }
 _PLAIN = {"seconds_median", "auroc_present"}
 

@@ -41,6 +41,8 @@ _REFINED = 2  # trials whose separation is computed with refits that are not onl
 _PASSES = 3
 
 Pair = tuple[int, int]
+_Promise = tuple[Trial, Mapping[Pair, float]]
+"""A trial, and the separation of each pair that it promises, in sigma."""
 
 
 def next_experiment(
@@ -62,9 +64,11 @@ def next_experiment(
     if len(rivals) < 2 or not recorded.repeatable:
         return None
     bench = _Bench(recorded, noise_std, rivals, misfit)
-    screened = [(t, found) for t in trials(recorded, bench.rigid) if (found := bench.linear(t))]
-    screened.sort(key=lambda one: bench.merit(*one), reverse=True)
-    refined = [(t, bench.refitted(t)) for t, _ in screened[:_REFINED]]
+    refined: list[_Promise] = []
+    for trial, linear in _most_promising(bench, trials(recorded, bench.rigid)):
+        if any(bench.merit(*one) >= bench.merit(trial, linear) for one in refined):
+            break
+        refined.append((trial, bench.refitted(trial)))
     if not refined:
         return None
     best, sigmas = max(refined, key=lambda one: bench.merit(*one))
@@ -81,6 +85,22 @@ def next_experiment(
         rig_time_s=bench.rig_time_s(best),
         settings=dict(best.settings),
     )
+
+
+def _most_promising(bench: _Bench, tried: Sequence[Trial]) -> list[_Promise]:
+    """Return the feasible trials that separate most with linear refits, the best first.
+
+    A refit only brings rivals nearer, so what they differ by without one is a bound: a trial whose
+    bound is no better than what others are sure of needs none.
+    """
+    bounds = [(t, bound) for t in tried if (bound := bench.without_refit(t))]
+    found: list[_Promise] = []
+    for trial, bound in sorted(bounds, key=lambda one: bench.merit(*one), reverse=True):
+        if len(found) == _REFINED and bench.merit(trial, bound) <= bench.merit(*found[-1]):
+            break
+        found.append((trial, bench.linear(trial)))
+        found = sorted(found, key=lambda one: bench.merit(*one), reverse=True)[:_REFINED]
+    return found
 
 
 def _told(sigmas: Mapping[Pair, float]) -> list[Pair]:
@@ -133,17 +153,24 @@ class _Bench:
     def merit(self, trial: Trial, sigmas: Mapping[Pair, float]) -> tuple[float, ...]:
         """Return what trials are compared by: pairs separated, then separation for its cost.
 
-        Twice the rig time averages twice the noise, so separation grows with the root of it.
+        Twice the rig time averages twice the noise, so separation grows with the root of it. The
+        greater any separation, the greater is the merit.
         """
         told = _told(sigmas)
         least = min((sigmas[pair] for pair in told), default=max(sigmas.values()))
-        return len(told), min(least, ENOUGH_SIGMA) / self.rig_time_s(trial) ** 0.5, least
+        return len(told), min(least, ENOUGH_SIGMA) / self.rig_time_s(trial) ** 0.5
 
-    def linear(self, trial: Trial) -> dict[Pair, float] | None:
-        """Return the separation of each pair with linear refits; None if it is not feasible."""
+    def without_refit(self, trial: Trial) -> dict[Pair, float] | None:
+        """Return what the rivals of each pair differ by as they are; None if it is not feasible."""
         runs = self._run(trial, [fit.model for fit in self._fits])
         if not np.isfinite(runs).all() or np.abs(runs[:, 1]).max() > self._most_torque:
             return None
+        lines = self._lines_of(trial, runs)
+        off = [_parts((lines - own) * self._weight(trial, own)) for own in lines]
+        return self._weaker(trial, lambda a, b: float(np.linalg.norm(off[a][b])))
+
+    def linear(self, trial: Trial) -> dict[Pair, float]:
+        """Return the separation of each pair with linear refits."""
         responses = [self._response(trial, fit) for fit in self._fits]
         return self._weaker(trial, lambda a, b: self._linear(trial, responses, a, b))
 
@@ -176,8 +203,11 @@ class _Bench:
 
     def _lines(self, trial: Trial, models: Sequence[Model]) -> np.ndarray:
         """Return the lines of y (and q) of each model, complex (models, outputs, lines)."""
+        return self._lines_of(trial, self._run(trial, models))
+
+    def _lines_of(self, trial: Trial, runs: np.ndarray) -> np.ndarray:
         outputs = [0, 2][: self._noise.shape[0]]
-        return line_spectrum(self._run(trial, models)[:, outputs], trial.lines)
+        return line_spectrum(runs[:, outputs], trial.lines)
 
     def _response(self, trial: Trial, fit: CellFit) -> _Response:
         x, steps = fit.solution.x, _steps(fit, fit.solution.x)

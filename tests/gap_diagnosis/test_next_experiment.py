@@ -13,6 +13,7 @@ from fjr_records.periodic import RecordedExperiment, RecordedRealization
 from fjr_sim_node import effects, plant
 from fjr_sim_node.plant import PLANT
 from fjr_sim_node.simulation.closed_loop import simulate
+from gap_diagnosis.next_experiment import choice
 from gap_diagnosis.next_experiment.choice import LEAST_SIGMA, next_experiment
 from gap_diagnosis.next_experiment.trials import Trial, trials
 
@@ -117,6 +118,20 @@ def test_no_experiment_is_proposed_for_what_is_the_same_in_every_experiment(bias
     case, std, fits, misfit = biased
     assert {fit.effects[0] for fit in fits} == {"torque_bias", "asymmetric_friction"}
     assert next_experiment(case.recorded, std, fits, misfit) is None
+
+
+def test_a_trial_that_is_not_refitted_promises_no_more_than_those_that_are(biased):
+    case, std, fits, misfit = biased
+    bench = choice._Bench(case.recorded, std, fits, misfit)
+    feasible = {t.description: t for t in trials(case.recorded) if bench.without_refit(t)}
+    assert len(feasible) > choice._REFINED
+    linear = {name: bench.linear(trial) for name, trial in feasible.items()}
+    for name, trial in feasible.items():
+        bound = bench.without_refit(trial)
+        assert all(linear[name][pair] <= bound[pair] * (1.0 + 1e-9) for pair in bound)
+    merits = sorted((bench.merit(feasible[n], linear[n]) for n in feasible), reverse=True)
+    chosen = choice._most_promising(bench, list(feasible.values()))
+    assert [bench.merit(*one) for one in chosen] == merits[: choice._REFINED]
 
 
 def test_nothing_is_proposed_for_one_explanation_or_an_unknown_loop(biased):
