@@ -2,8 +2,9 @@
 
 Recorded runs and a nominal (datasheet) go in, an `outcome.diagnosis.Diagnosis` and its report come
 out. `any_record` reads what a folder holds; `investigation` leads from runs to a verdict, through
-the stages `which` (fits of effects, their tests), `how_far` (the gap on data that no fit has seen)
-and `judgement`. An experiment of steady periods comes through `steady_periods`: `gates` before it
+the stages `which` (the search over effects), `verdict` (what of it is kept, and how sure) and
+`how_far` (the gap on data that no fit has seen); where fits end at a limit, `further_looks` asks
+for another one. An experiment of steady periods comes through `steady_periods`: `gates` before it
 (are the periods fit for a diagnosis?), residual maps (`where`), BLA and `next_experiment` after it.
 All simulate through `model`; `report` writes what was found. `foresight` says beforehand what could
 be found.

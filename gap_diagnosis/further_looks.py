@@ -12,8 +12,8 @@ import math
 from collections.abc import Mapping
 
 from .investigation import Investigation
-from .notes import at_limits
 from .outcome.diagnosis import Diagnosis
+from .verdict.notes import at_limits
 from .which.search_space import farthest
 
 WIDER, CLOSER = 5.0, 0.2

@@ -14,24 +14,23 @@ from fjr_records.driven import wrong_sign
 from fjr_records.periodic import RecordedExperiment, RecordedRealization
 from fjr_records.records import Record, RecordSet
 
-from .coarse_encoder import with_coarse_encoder
 from .gates.bag_deviations import GROUPS
 from .gates.bags_gate import as_bags, drift_of_runs, run_changes, scattering
 from .how_far.ledger import Ledger
 from .how_far.steady_view import SteadyView
-from .judgement import judge
-from .kept_causes import kept
 from .model.evidence import Evidence
 from .model.quasi_static import NOTE as QUASI_STATIC
 from .model.quasi_static import Stations
 from .model.record_length import within
 from .model.rig_model import Model
 from .model.steady_runs import SteadyRuns
-from .notes import at_limits
 from .outcome.diagnosis import Bags, Diagnosis
 from .outcome.verdict_words import OUT_OF_TIME, ROUNDING
-from .tested_causes import Tested
-from .torque_timing import Timing, timed
+from .verdict.coarse_encoder import with_coarse_encoder
+from .verdict.judgement import judge
+from .verdict.kept_causes import kept
+from .verdict.notes import at_limits
+from .verdict.tested_causes import Tested
 from .which.catalogue import catalogue
 from .which.cell_fits import CellFitter
 from .which.comparison import NOTHING_LEFT, CellFit
@@ -42,6 +41,7 @@ from .which.gains import stands_for
 from .which.rounding import beside_rounding
 from .which.search_space import TOLERANCE
 from .which.stepwise import Stepwise
+from .which.torque_timing import Timing, timed
 from .which.unseen_friction import SCATTER
 
 Progress = Callable[[str], None]

@@ -13,20 +13,20 @@ import numpy as np
 from fjr_records.noise import even_lines_as_noise
 from fjr_records.periodic import RecordedExperiment
 
-from .drift_gate import drift_gate
 from .gates.bags_gate import bags_gate
 from .gates.gate_checks import DISCRETISATION_LIMIT, GateReport, check_gates
 from .how_far.bla_gap import bla_gap
 from .how_far.steady_view import SteadyView
 from .investigation import Fitted, Investigation, Order, investigate_runs
-from .judgement import stopped
 from .model.discretisation import discretisation_error
 from .model.rig_model import Model
 from .model.simulated_rig import Simulator
 from .model.steady_runs import compared, steady_runs
 from .next_experiment.choice import next_experiment
 from .outcome.diagnosis import Diagnosis, NextExperiment
+from .verdict.judgement import stopped
 from .which.catalogue import catalogue
+from .which.drift_gate import drift_gate
 
 UNSTEADY = (
     "The periods do not repeat as steady ones do, so the whole runs were searched for causes "

@@ -17,9 +17,9 @@ from fjr_sim_node.simulation.closed_loop import simulate
 from gap_diagnosis.gates.bag_deviations import GROUPS
 from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.model.rig_model import Model
-from gap_diagnosis.notes import at_limits
 from gap_diagnosis.outcome.diagnosis import Figure
-from gap_diagnosis.tested_causes import causes_with_tests
+from gap_diagnosis.verdict.notes import at_limits
+from gap_diagnosis.verdict.tested_causes import causes_with_tests
 from gap_diagnosis.which import unseen_friction
 from gap_diagnosis.which.cell_fits import CellFitter
 from gap_diagnosis.which.cell_weights import independent

@@ -9,7 +9,9 @@ from dataclasses import replace
 import pytest
 from test_evidence import NOMINAL, SCATTER, records
 
-from gap_diagnosis.kept_causes import (
+from gap_diagnosis.model.evidence import Evidence
+from gap_diagnosis.outcome.diagnosis import Estimate
+from gap_diagnosis.verdict.kept_causes import (
     SURE,
     _begun_anew,
     _changing,
@@ -18,9 +20,7 @@ from gap_diagnosis.kept_causes import (
     _one_by_one,
     kept,
 )
-from gap_diagnosis.model.evidence import Evidence
-from gap_diagnosis.outcome.diagnosis import Estimate
-from gap_diagnosis.tested_causes import LEAST_PRESENT, causes_with_tests
+from gap_diagnosis.verdict.tested_causes import LEAST_PRESENT, causes_with_tests
 from gap_diagnosis.which import stepwise
 from gap_diagnosis.which.cell_fits import CellFitter
 from gap_diagnosis.which.found import Found

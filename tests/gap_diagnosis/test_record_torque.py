@@ -18,8 +18,8 @@ from gap_diagnosis.model.record_torque import (
     mean_over_samples,
     with_continuous_torque,
 )
-from gap_diagnosis.torque_timing import Timing, timed
 from gap_diagnosis.which.cell_fits import CellFitter
+from gap_diagnosis.which.torque_timing import Timing, timed
 
 RATE, FINER = 200.0, 10
 NOMINAL = {name: float(value) for name, value in plant.PLANT.defaults().items()}

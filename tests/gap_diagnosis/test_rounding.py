@@ -18,7 +18,6 @@ from fjr_sim_node import effects as fx
 from fjr_sim_node.plant import PLANT, coefficients
 from fjr_sim_node.simulation.closed_loop import simulate
 from gap_diagnosis.any_record import investigate
-from gap_diagnosis.coarse_encoder import with_coarse_encoder
 from gap_diagnosis.how_far.ledger import Ledger
 from gap_diagnosis.investigation import Investigation
 from gap_diagnosis.model.evidence import Evidence
@@ -27,6 +26,7 @@ from gap_diagnosis.outcome.diagnosis import Diagnosis
 from gap_diagnosis.outcome.verdict_words import ROUNDING
 from gap_diagnosis.report.gap_report import compared, render_gap_report
 from gap_diagnosis.report.updated_parameters import updated_values
+from gap_diagnosis.verdict.coarse_encoder import with_coarse_encoder
 from gap_diagnosis.which.rounding import (
     STEP,
     beside_rounding,

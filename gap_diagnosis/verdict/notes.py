@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from .outcome.verdict_words import ROUNDING
-from .which.search_space import Space
+from ..outcome.verdict_words import ROUNDING
+from ..which.search_space import Space
 
 SCALED = "A torque-constant error is equivalent to scaling all parameters."
 

@@ -9,14 +9,14 @@ from dataclasses import replace
 
 from fjr_sim_node import effects as fx
 
+from ..outcome.verdict_words import explanation
+from ..which.cell_fits import CellFitter
+from ..which.comparison import CellFit
+from ..which.equivalents import founded, partners
+from ..which.found import Found
+from ..which.gains import gain, stands_for
 from .judgement import FEWEST_PARTS
-from .outcome.verdict_words import explanation
 from .tested_causes import Tested, causes_with_tests
-from .which.cell_fits import CellFitter
-from .which.comparison import CellFit
-from .which.equivalents import founded, partners
-from .which.found import Found
-from .which.gains import gain, stands_for
 
 Progress = Callable[[str], None]
 

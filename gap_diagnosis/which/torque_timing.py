@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 
 from fjr_records.records import RecordSet
 
-from .model.evidence import Evidence
-from .model.record_torque import CONTINUOUS, with_continuous_torque
-from .model.rig_model import Model
-from .which.cell_fits import CellFitter
-from .which.comparison import CellFit
-from .which.gains import gain, stands_for
+from ..model.evidence import Evidence
+from ..model.record_torque import CONTINUOUS, with_continuous_torque
+from ..model.rig_model import Model
+from .cell_fits import CellFitter
+from .comparison import CellFit
+from .gains import gain, stands_for
 
 Progress = Callable[[str], None]
 

@@ -16,17 +16,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .how_far.ledger import Ledger
+from ..how_far.ledger import Ledger
+from ..model.evidence import Evidence
+from ..model.rig_model import Model
+from ..outcome.diagnosis import Cause, Diagnosis, Estimate, GapFigures, Step
+from ..outcome.verdict_words import ROUNDING
+from ..which.cell_fits import CellFitter
+from ..which.comparison import NOTHING_LEFT, CellFit
+from ..which.found import Found
+from ..which.rounding import STEP, step_of, with_step
 from .judgement import FEWEST_PARTS, PLAIN, gaps_of, verdict_of
-from .model.evidence import Evidence
-from .model.rig_model import Model
 from .notes import rounding
-from .outcome.diagnosis import Cause, Diagnosis, Estimate, GapFigures, Step
-from .outcome.verdict_words import ROUNDING
-from .which.cell_fits import CellFitter
-from .which.comparison import NOTHING_LEFT, CellFit
-from .which.found import Found
-from .which.rounding import STEP, step_of, with_step
 
 _CERTAIN = 60.0
 """Least fall of the chi-square of unseen parts, whatever its share."""

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from .gates.gate_checks import GateReport
-from .how_far.ledger import Ledger
-from .model.evidence import Evidence
-from .model.rig_model import Model
-from .model.steady_runs import SteadyRuns
-from .notes import SCALED, beyond_tolerance
-from .outcome.diagnosis import (
+from ..gates.gate_checks import GateReport
+from ..how_far.ledger import Ledger
+from ..model.evidence import Evidence
+from ..model.rig_model import Model
+from ..model.steady_runs import SteadyRuns
+from ..outcome.diagnosis import (
     Bags,
     Candidate,
     Cause,
@@ -23,16 +22,17 @@ from .outcome.diagnosis import (
     Step,
     Verdict,
 )
-from .tested_causes import Tested
-from .which.cell_fits import CellFitter
-from .which.comparison import NOTHING_LEFT, CellFit
-from .which.estimates import linear_estimates, standard_errors
-from .which.found import Found
-from .which.gains import gain
-from .which.presence import (
+from ..which.cell_fits import CellFitter
+from ..which.comparison import NOTHING_LEFT, CellFit
+from ..which.estimates import linear_estimates, standard_errors
+from ..which.found import Found
+from ..which.gains import gain
+from ..which.presence import (
     cell_estimates,
     where_it_acts,
 )
+from .notes import SCALED, beyond_tolerance
+from .tested_causes import Tested
 
 PLAIN = 4.0
 """Misfit below which the refit alone explains the gap, where no effect gains anything."""

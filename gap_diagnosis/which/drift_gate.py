@@ -11,13 +11,13 @@ from dataclasses import replace
 
 from fjr_records.records import RecordSet
 
-from .gates.gate_checks import Gate
-from .model.evidence import Evidence
-from .model.rig_model import Model
-from .which.cell_fits import CellFitter
-from .which.comparison import CellFit
-from .which.gains import MOST_P, Gain, closed, gain
-from .which.stepwise import LEAST_CLOSED
+from ..gates.gate_checks import Gate
+from ..model.evidence import Evidence
+from ..model.rig_model import Model
+from .cell_fits import CellFitter
+from .comparison import CellFit
+from .gains import MOST_P, Gain, closed, gain
+from .stepwise import LEAST_CLOSED
 
 _DRIFT = "nonstationary"
 _NAME = f"{_DRIFT}.friction_per_s"

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .how_far.ledger import Ledger
-from .outcome.diagnosis import Figure
-from .which.cell_fits import CellFitter
-from .which.comparison import CellFit
-from .which.gains import Gain, closed, fall, gain
-from .which.presence import (
+from ..how_far.ledger import Ledger
+from ..outcome.diagnosis import Figure
+from ..which.cell_fits import CellFitter
+from ..which.comparison import CellFit
+from ..which.gains import Gain, closed, fall, gain
+from ..which.presence import (
     LEAST_INVARIANCE_P,
     SAME_WORTH,
     Invariance,
@@ -22,7 +22,7 @@ from .which.presence import (
     cell_estimates,
     invariance,
 )
-from .which.ripples_passed import doubt_of_shape, ripples_passed
+from ..which.ripples_passed import doubt_of_shape, ripples_passed
 
 LEAST_PRESENT = 0.5
 """A cause that is there less often than not is not called present."""
