@@ -19,8 +19,8 @@ import numpy as np
 from fjr_records.record_noise import RecordNoise, band_lines, record_noise
 from fjr_records.records import RecordSet
 
-from .lapped import lapped
-from .parts import Purpose, cut
+from .lapped import lapped, samples_of
+from .parts import Purpose, cut, joined, spans_of
 from .quasi_static import QuasiStaticSimulator, Stations
 from .record_rig import RecordSimulator
 from .rig_model import Model
@@ -195,14 +195,14 @@ class Evidence:
 
         A model whose motion diverges has errors of 1e6 times the motion.
         """
-        spans = self._spans(which)
-        rows = []
+        parts = [self.parts[i] for i in which]
+        spans, rows = spans_of(parts), []
         for runs in self.simulator.run(models, list(spans)):
             lines = {
                 index: self.lines_of(run[0], index, spans[index])
                 for index, run in zip(spans, runs, strict=True)
             }
-            rows.append(self._joined(lines, spans, which))
+            rows.append(joined(lines, spans, parts))
         return np.array(rows)
 
     def lines_of(
@@ -213,28 +213,8 @@ class Evidence:
         most = _DIVERGED * np.abs(measured).max()
         if not np.isfinite(position).all():
             return np.full(measured[windows].shape, most)
-        lines = lapped(position[_samples_of(windows, self.hop)], self.hop)[:, : self.lines]
+        lines = lapped(position[samples_of(windows, self.hop)], self.hop)[:, : self.lines]
         return np.clip(lines - measured[windows], -most, most)
-
-    def _spans(self, which: Sequence[int]) -> dict[int, slice]:
-        """Return the windows from the first to the last of some parts, by their records."""
-        spans: dict[int, slice] = {}
-        for part in sorted((self.parts[i] for i in which), key=lambda part: part.record):
-            now = spans.get(part.record, part.windows)
-            begin, end = min(now.start, part.windows.start), max(now.stop, part.windows.stop)
-            spans[part.record] = slice(begin, end)
-        return spans
-
-    def _joined(
-        self, lines: Mapping[int, np.ndarray], spans: Mapping[int, slice], which: Sequence[int]
-    ) -> np.ndarray:
-        """Return the numbers on parts, (numbers,), of lines in the spans of their records."""
-        pieces = []
-        for part in (self.parts[i] for i in which):
-            first = spans[part.record].start
-            own = lines[part.record][part.windows.start - first : part.windows.stop - first]
-            pieces.append(own.ravel())
-        return np.concatenate(pieces)
 
     def measured(self, which: Sequence[int]) -> np.ndarray:
         """Return the lines of what is compared, as it was measured, on parts, (errors,), rad.
@@ -260,12 +240,13 @@ class Evidence:
             every: a divisor of half the hop.
         """
         hop, scale = self.hop // every, np.sqrt(every)  # the transform is orthonormal
-        spans = self._spans(which)
+        parts = [self.parts[i] for i in which]
+        spans = spans_of(parts)
         lines = {
-            index: scale * lapped(positions[index][_samples_of(span, hop)], hop)[:, : self.lines]
+            index: scale * lapped(positions[index][samples_of(span, hop)], hop)[:, : self.lines]
             for index, span in spans.items()
         }
-        return self._joined(lines, spans, which)
+        return joined(lines, spans, parts)
 
     def cell_of(self, which: Sequence[int]) -> np.ndarray:
         """Return the cell of each error on parts, int (errors,)."""
@@ -315,13 +296,6 @@ class Evidence:
         count = np.bincount(cell, minlength=self.cells)
         total = np.bincount(cell, values**2, self.cells)
         return total / np.maximum(count, 1)
-
-
-def _samples_of(windows: slice, hop: int) -> slice:
-    """Return the samples of some windows; of all, all."""
-    if windows.stop is None:
-        return slice(None)
-    return slice(windows.start * hop, (windows.stop + 1) * hop)
 
 
 def _edges(lines: int) -> np.ndarray:

@@ -19,6 +19,13 @@ def windows_in(samples: int, hop: int) -> int:
     return max(samples // hop - 1, 0)
 
 
+def samples_of(windows: slice, hop: int) -> slice:
+    """Return the samples of windows from one to another; of all, all."""
+    if windows.stop is None:
+        return slice(None)
+    return slice(windows.start * hop, (windows.stop + 1) * hop)
+
+
 def lapped(signal: np.ndarray, hop: int) -> np.ndarray:
     """Return the lines of all whole windows of signals.
 

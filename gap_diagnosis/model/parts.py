@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -64,6 +65,37 @@ def cut(records: RecordSet, hop: int, run_in: int = 0) -> list[Part]:
                 stretch = block // len(_CYCLE) if len(members) == 1 else block
                 parts.append(Part(index, level, windows, purpose, stretch))
     return parts
+
+
+def spans_of(parts: Sequence[Part]) -> dict[int, slice]:
+    """Return the windows from the first to the last of some parts, by record, ascending."""
+    spans: dict[int, slice] = {}
+    for part in sorted(parts, key=lambda part: part.record):
+        now = spans.get(part.record, part.windows)
+        begin, end = min(now.start, part.windows.start), max(now.stop, part.windows.stop)
+        spans[part.record] = slice(begin, end)
+    return spans
+
+
+def joined(
+    lines: Mapping[int, np.ndarray], spans: Mapping[int, slice], parts: Sequence[Part]
+) -> np.ndarray:
+    """Return the numbers on parts, one after the other.
+
+    Args:
+        lines: by record, (windows, lines) of its span.
+        spans: from `spans_of` these parts, or more.
+        parts: which.
+
+    Returns:
+        (numbers,).
+    """
+    pieces = []
+    for part in parts:
+        first = spans[part.record].start
+        own = lines[part.record][part.windows.start - first : part.windows.stop - first]
+        pieces.append(own.ravel())
+    return np.concatenate(pieces)
 
 
 def _purpose(records: int, place: int, block: int) -> Purpose:

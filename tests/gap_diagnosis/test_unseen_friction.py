@@ -91,5 +91,6 @@ def test_few_parts_show_an_effect_if_all_of_them_do(gains, there, monkeypatch):
     change = np.zeros(24)
     change[: len(gains)] = gains
     monkeypatch.setattr(CellFitter, "gains", lambda self, after, before: change)
+    monkeypatch.setattr("gap_diagnosis.which.gains.left_of", lambda *_: 1.0)
     fitter = object.__new__(CellFitter)
     assert gain(fitter, None, None, change != 0.0).present == there
