@@ -35,6 +35,15 @@ def test_a_cause_is_named_beside_what_the_catalogue_does_not_hold(found):
     assert diagnosis.remainder.share > 0.0
 
 
+def test_each_rival_is_kept_once(found):
+    """Further looks at a step that add no fit once kept those of the first look again."""
+    assert found.fitted is not None
+    rivals = found.fitted.found.rivals
+    assert rivals
+    for fits in rivals.values():
+        assert len({id(fit) for fit in fits}) == len(fits) > 0
+
+
 def test_it_keeps_what_only_periods_tell(found):
     notes = found.diagnosis.notes
     assert len(notes) == len(set(notes))
