@@ -160,8 +160,10 @@ def test_an_effect_must_repeat_only_where_it_acts():
     levels = np.array([fitter.evidence.parts[part].level for part in fitter.select_parts])
     assert not fit.acts[levels == 0].any() and fit.acts[levels == 1].all()
     where_it_acts = gain(fitter, fit, refit, fit.acts)
-    assert where_it_acts.present and where_it_acts.share == 1.0
-    assert 0.5 ** np.sum(levels == 1) <= where_it_acts.p <= 0.5**5  # parts that hold the error
+    held = np.sum(fitter.weights.counts * refit.left, axis=1)
+    counted = np.sum(fit.acts & (held >= 0.02 * held.max()))  # it closes nearly all of the error
+    assert 5 <= counted < np.sum(levels == 1)
+    assert where_it_acts.present and where_it_acts.p == 0.5**counted
 
 
 @pytest.mark.parametrize(("left", "present"), [(0.01, True), (0.5, False)])
