@@ -32,7 +32,7 @@ from .verdict.kept_causes import kept
 from .verdict.notes import at_limits
 from .verdict.tested_causes import Tested
 from .which.catalogue import catalogue
-from .which.cell_fits import CellFitter
+from .which.cell_fits import DRIFT, CellFitter
 from .which.comparison import NOTHING_LEFT, CellFit
 from .which.equivalents import founded, partners
 from .which.estimates import moved_by_scatter, relative_scatter
@@ -130,6 +130,7 @@ class Order:
         budget_s: time for search and tests together, from here on; what is begun is ended.
         progress: told what is done.
         begun: when it was given (s, `time.monotonic`).
+        drift: whether friction that drifts is one of all, where runs tell when they began.
     """
 
     nominal: Mapping[str, float]
@@ -138,6 +139,7 @@ class Order:
     budget_s: float = math.inf
     progress: Progress = lambda _: None
     begun: float = field(default_factory=time.monotonic)
+    drift: bool = False
 
     @property
     def search_ends(self) -> float:
@@ -165,6 +167,8 @@ def investigate_runs(
     )  # fmt: skip
     model = Model.nominal(nominal)
     names = catalogue(model.plant, order.effects)
+    if order.drift and order.effects is None:
+        names.append(DRIFT)
     if slow is None:
         records, cut = within(records)
         progress("windows and noise")

@@ -13,7 +13,7 @@ import numpy as np
 from fjr_records.noise import even_lines_as_noise
 from fjr_records.periodic import RecordedExperiment
 
-from .gates.bags_gate import bags_gate
+from .gates.bags_gate import bags_gate, friction_ordered
 from .gates.gate_checks import DISCRETISATION_LIMIT, GateReport, check_gates
 from .how_far.bla_gap import bla_gap
 from .how_far.steady_view import SteadyView
@@ -26,11 +26,17 @@ from .next_experiment.choice import next_experiment
 from .outcome.diagnosis import Diagnosis, NextExperiment
 from .verdict.judgement import stopped
 from .which.catalogue import catalogue
-from .which.drift_gate import drift_gate
+from .which.cell_fits import DRIFT
+from .which.drift_gate import drift_gate, follows_time
 
 UNSTEADY = (
     "The periods do not repeat as steady ones do, so the whole runs were searched for causes "
     "beside a remainder, which a change within a run is a part of."
+)
+
+DRIFTS = (
+    "From run to run friction goes one way, so the whole runs were searched for causes beside a "
+    "drift of friction."
 )
 
 ALONE = (
@@ -58,7 +64,7 @@ def investigate_periods(recorded: RecordedExperiment, order: Order) -> Investiga
         return _unsteady(view, nominal, order)
     if gates.hint != "none":
         return _stopped(view, nominal)
-    return _viewed(investigate_runs(steady_runs(recorded), order), view)
+    return _viewed(investigate_runs(steady_runs(recorded), order), view, order)
 
 
 def _stopped(view: SteadyView, nominal: Model) -> Investigation:
@@ -83,15 +89,16 @@ def _swinging(view: SteadyView, nominal: Model, order: Order) -> Investigation:
 
 def _unsteady(view: SteadyView, nominal: Model, order: Order) -> Investigation:
     """Diagnose whole runs of periods that do not repeat; where nothing is named, a drift may be."""
-    whole = investigate_runs(view.recorded.as_records(), order)
-    if whole.diagnosis.causes or whole.fitted is None:
+    whole = _beside_drift(view.recorded, order)
+    drifts = whole.diagnosis.effects == [DRIFT]
+    if whole.fitted is None or (whole.diagnosis.causes and not drifts):
         failed = [gate.sentence for gate in view.gates.failures]
-        return _with(whole, notes=[UNSTEADY, *failed, *view.gates.notes, *whole.diagnosis.notes])
+        return _noted(whole, UNSTEADY, *failed, *view.gates.notes)
     order.progress("drift within runs")
     gate = drift_gate(whole.fitted.fitter, whole.fitted.found.steps[0])
     gates = replace(view.gates, gates=(*view.gates.gates, gate))
     found = _stopped(replace(view, gates=gates), nominal)
-    if gate.passed:
+    if gate.passed and not drifts:
         return found
     steadier = [g for g in gates.gates if g.passed or g.hint != "bad_data" or not g.of_periods]
     told = stopped("nonstationary", replace(gates, gates=tuple(steadier)))
@@ -99,11 +106,32 @@ def _unsteady(view: SteadyView, nominal: Model, order: Order) -> Investigation:
     return replace(found, diagnosis=told.model_copy(update=seen))
 
 
-def _viewed(found: Investigation, view: SteadyView) -> Investigation:
-    """Return what was found in mean periods with what only steady periods show."""
+def _beside_drift(recorded: RecordedExperiment, order: Order) -> Investigation:
+    """Diagnose whole runs, a drift of friction being one of the causes if it goes with time."""
+    runs = recorded.as_records()
+    whole = investigate_runs(runs, replace(order, drift=True))
+    if DRIFT not in whole.diagnosis.effects or whole.fitted is None:
+        return whole
+    if follows_time(whole.fitted.fitter, whole.fitted.found.best):
+        return whole
+    return investigate_runs(runs, order)
+
+
+def _viewed(found: Investigation, view: SteadyView, order: Order) -> Investigation:
+    """Return what was found in mean periods with what only steady periods show.
+
+    Where something is left and friction goes one way from run to run, whole runs tell more.
+    """
     fitted, told = found.fitted, found.diagnosis
     assert fitted is not None
-    recorded = view.recorded
+    recorded, drift = view.recorded, False
+    if told.verdict in ("unexplained", "partly_explained"):
+        best = fitted.found.best
+        if friction_ordered(fitted.evidence, best.variance, best.model):
+            whole = _beside_drift(recorded, order)
+            drift = DRIFT in whole.diagnosis.effects
+            if drift and len(whole.diagnosis.effects) > 1:
+                return _noted(whole, DRIFTS, *view.gates.notes)
     gate = bags_gate(told.bags, recorded)
     gates = GateReport((*view.gates.gates, gate), view.gates.notes)
     models = {
@@ -114,7 +142,7 @@ def _viewed(found: Investigation, view: SteadyView) -> Investigation:
     view = replace(view, gates=gates, held=_held(fitted, recorded), models=models)
     figures = bla_gap(recorded, view.held, view.signals, closes=bool(told.causes))
     seen = None if told.gap_figures is None else told.gap_figures.model_copy(update=figures)
-    drifts = not gate.passed and not told.causes
+    drifts = (drift or not gate.passed) and not told.causes
     beyond = view.maps["refit"].places()
     told = told.model_copy(
         update={
@@ -124,6 +152,7 @@ def _viewed(found: Investigation, view: SteadyView) -> Investigation:
             "next_experiment": _next(fitted, view, told),
             "notes": [
                 *([gate.sentence] if not gate.passed else []),
+                *([DRIFTS] if drift else []),
                 *([ALONE] if told.reported_on == "blocks" and _alone(recorded) else []),
                 *gates.notes,
                 *told.notes,
@@ -156,5 +185,7 @@ def _next(fitted: Fitted, view: SteadyView, told: Diagnosis) -> NextExperiment |
     return next_experiment(view.recorded, noise, fits, max(misfit or 1.0, 1.0))
 
 
-def _with(found: Investigation, **changes: object) -> Investigation:
-    return replace(found, diagnosis=found.diagnosis.model_copy(update=changes))
+def _noted(found: Investigation, *notes: str) -> Investigation:
+    told = found.diagnosis
+    said = told.model_copy(update={"notes": [*notes, *told.notes]})
+    return replace(found, diagnosis=said)

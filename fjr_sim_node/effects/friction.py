@@ -7,7 +7,12 @@ from collections.abc import Mapping
 
 from .entry import Effect, EffectParameter, Start, ripple, ripple_starts, size
 
-_STRIBECK_STARTS = ({"torque_nm": (0.002, 0.015), "velocity_rad_s": (0.0025, 0.0125, 0.06, 0.3)},)
+# A level above Coulomb friction bends the bare parameters so far that small ones promise nothing;
+# a great level that falls within a small velocity would only make the plant stiff.
+_STRIBECK_STARTS = (
+    {"torque_nm": (0.002, 0.015), "velocity_rad_s": (0.0025, 0.0125, 0.06, 0.3)},
+    {"torque_nm": (0.15,), "velocity_rad_s": (0.06, 0.3)},
+)
 _SHORT = (3e-4, 3e-3, 3e-2)
 _ARMSTRONG = "Armstrong-Helouvry, Dupont, Canudas de Wit 1994, Automatica 30(7)"
 

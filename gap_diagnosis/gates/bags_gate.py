@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.stats import norm
+from scipy import stats
 
 from fjr_records.periodic import RecordedExperiment
 
@@ -17,6 +17,7 @@ from .gate_checks import Gate, untested
 
 SCATTER_SHOWN = 1e-3
 """Least relative scatter from bag to bag that a sentence mentions."""
+_ONE_WAY = 0.1  # chance that runs without a drift stand in such an order: then more is looked at
 
 
 def bags_gate(bags: Bags | None, recorded: RecordedExperiment) -> Gate:
@@ -43,7 +44,8 @@ def bags_gate(bags: Bags | None, recorded: RecordedExperiment) -> Gate:
         else f"{group} follows a trend from bag to bag {_along(worst)} over the record; let the "
         "rig warm up, or record levels interleaved."
     )
-    z, limit = (float(norm.isf(0.5 * max(p, 1e-300))) for p in (worst.p_value, TREND_FALSE_ALARM))
+    chances = worst.p_value, TREND_FALSE_ALARM
+    z, limit = (float(stats.norm.isf(0.5 * max(p, 1e-300))) for p in chances)
     return Gate(
         name=name,
         passed=passed,
@@ -67,6 +69,22 @@ def run_changes(evidence: Evidence, variance: np.ndarray, model: Model) -> BagCh
     levels = np.array([r.level for r in evidence.records.records])
     errors, blocks = run_errors(evidence, variance)
     return bag_changes(errors, levels, _times(evidence), model, blocks)
+
+
+def friction_ordered(evidence: Evidence, variance: np.ndarray, model: Model) -> bool:
+    """Tell whether friction goes one way from run to run, whatever law may be wrong.
+
+    Not whether it drifts: what a wrong law leaves may go one way from level to level.
+
+    Args:
+        evidence: the runs.
+        variance: (cells,), of an error in each cell, rad2.
+        model: the best model.
+    """
+    changes = run_changes(evidence, variance, model)
+    own = [t for t in changes.trends if t.group == "friction"] if changes else []
+    p = [stats.kendalltau(_times(evidence), trend.deviation).pvalue for trend in own]
+    return bool(p) and p[0] <= _ONE_WAY
 
 
 def _times(evidence: Evidence) -> np.ndarray:

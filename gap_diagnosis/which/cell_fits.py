@@ -34,6 +34,8 @@ _ADDED_ROUNDS = (6, 4)
 _LEAST_PROMISE = 20.0  # a start that gains less than this (twice the nats) is not pursued
 _STARTS = 2
 RIPPLES_TRIED = 3
+DRIFT = "nonstationary"
+_DRIFTS = 0.1  # of friction, until the last run ends: where fits of a drift begin, either way
 _RIVAL = 0.05  # an error: a second start that costs so much more than the first is not pursued
 _FURTHER = 4  # times that a fit is taken further at the most
 _STILL_FALLS = 0.8  # of its misfit
@@ -87,8 +89,16 @@ class CellFitter(Comparison):
             )
         elif effect in LOADS:
             seen = self._ripples(parent)[1].load(effect)
+        elif effect == DRIFT:
+            seen = self._drifts()
         seeds = [*starts(effect, self.scales, cycles, self.nominal), *seen]
         return self.screening_of(parent, seeds)
+
+    def _drifts(self) -> list[dict[str, float]]:
+        """Return starts of a drift of friction over all runs."""
+        records = self.evidence.records
+        end = max(r.elapsed_s + r.samples / records.sample_rate_hz for r in records.records)
+        return [{f"{DRIFT}.friction_per_s": sign * _DRIFTS / end} for sign in (1.0, -1.0)]
 
     def two_harmonics(self, parent: CellFit, effect: str) -> list[dict[str, float]]:
         """Return starts of a ripple with a second harmonic beside a fit, the best first.

@@ -1,4 +1,4 @@
-"""Does friction drift within the runs? The gate of periods that do not repeat, on whole runs.
+"""Does friction drift while the rig is recorded? By a model of the whole runs.
 
 Lines without excitation tell a drift from a transient without a model (`stationarity`); where all
 lines are excited a model must: runs are played from their true start, so that a transient is in
@@ -14,14 +14,12 @@ from fjr_records.records import RecordSet
 from ..gates.gate_checks import Gate
 from ..model.evidence import Evidence
 from ..model.rig_model import Model
-from .cell_fits import CellFitter
+from .cell_fits import DRIFT, CellFitter
 from .comparison import CellFit
 from .gains import MOST_P, Gain, closed, gain
 from .stepwise import LEAST_CLOSED
 
-_DRIFT = "nonstationary"
-_NAME = f"{_DRIFT}.friction_per_s"
-_BEGINS = 0.1  # of friction, until the last run ends: where fits begin, either way
+_NAME = f"{DRIFT}.friction_per_s"
 
 
 def drift_gate(fitter: CellFitter, refit: CellFit) -> Gate:
@@ -33,9 +31,7 @@ def drift_gate(fitter: CellFitter, refit: CellFit) -> Gate:
         fitter: of the runs.
         refit: fit of the base parameters alone.
     """
-    whole = Model(fitter.nominal, {}).whole_plant
-    evidence = Evidence(_anew(fitter.evidence.records), whole)
-    anew = CellFitter(evidence, fitter.nominal, fitter.tolerance)
+    anew = _with_runs(fitter, _anew(fitter.evidence.records))
     tried = [_drift(fitter, refit), _drift(anew, anew.refit())]
     found, change = max(tried, key=lambda one: one[0].mean)
     drifts = found.present and change != 0.0
@@ -57,17 +53,46 @@ def drift_gate(fitter: CellFitter, refit: CellFit) -> Gate:
     )
 
 
+def follows_time(fitter: CellFitter, fit: CellFit) -> bool:
+    """Tell whether a fit with a drift is worse where the runs of each level change their order.
+
+    Levels are recorded one after the other, as a rule. What a wrong law leaves is of another size
+    at each of them, and looks like a drift from level to level, but not from run to run within one.
+
+    Args:
+        fitter: of whole runs that tell when they began.
+        fit: with the drift.
+    """
+    records = fitter.evidence.records
+    if len(records.levels) == len(records.records):
+        return False
+    other = _with_runs(fitter, _swapped(records))
+    return gain(fitter, fit, other.taken_over(fit)).present
+
+
 def _drift(fitter: CellFitter, refit: CellFit) -> tuple[Gain, float]:
     """Return what a drift gains on unseen parts, and its size in percent per second."""
-    records = fitter.evidence.records
-    seconds = max(r.elapsed_s + r.samples / records.sample_rate_hz for r in records.records)
-    seeds = [{_NAME: sign * _BEGINS / seconds} for sign in (1.0, -1.0)]
-    fit = fitter.add(refit, _DRIFT, fitter.screening_of(refit, seeds).proposals())
+    fit = fitter.add(refit, DRIFT, fitter.screening(refit, DRIFT).proposals())
     if fit is None or closed(fitter, fit, refit) < LEAST_CLOSED:
         return Gain(0.0, 0.0, 0.0, 1.0), 0.0
     return gain(fitter, fit, refit), 100.0 * fit.model.effects[_NAME]
 
 
+def _with_runs(fitter: CellFitter, records: RecordSet) -> CellFitter:
+    evidence = Evidence(records, Model(fitter.nominal, {}).whole_plant)
+    return CellFitter(evidence, fitter.nominal, fitter.tolerance)
+
+
 def _anew(records: RecordSet) -> RecordSet:
     """Return runs each of which starts as cold as the first."""
     return replace(records, records=tuple(replace(r, elapsed_s=0.0) for r in records.records))
+
+
+def _swapped(records: RecordSet) -> RecordSet:
+    """Return runs that began in the reverse order within each level."""
+    began = {
+        level: [r.elapsed_s for r in records.records if r.level == level]
+        for level in records.levels
+    }
+    anew = tuple(replace(r, elapsed_s=began[r.level].pop()) for r in records.records)
+    return replace(records, records=anew)

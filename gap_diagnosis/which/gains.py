@@ -109,13 +109,18 @@ def left_of(fitter: CellFitter, after: CellFit, before: CellFit) -> float:
 def closed(fitter: CellFitter, after: CellFit, before: CellFit) -> float:
     """Return how much of what one fit leaves on unseen parts another closes, in one band.
 
-    The band is the one in which it gains most log-likelihood: a delay shows at high frequencies,
-    where little of the motion is. Of the torque of a slow motion it may be all bands together.
+    The band of the level in which it gains most log-likelihood: a delay shows at high frequencies
+    and friction in small motions, where little of the error is. Of the torque of a slow motion it
+    may be all bands together.
     """
     weights = fitter.weights
-    left = [np.sum(weights.counts * fit.left, axis=0) for fit in (before, after)]
-    most = int(np.argmax(weights.gained(after.left, before.left).sum(axis=0)))
-    in_band = float(1.0 - left[1][most] / left[0][most])
+    gained = weights.gained(after.left, before.left)
+    levels = [weights.select_levels == level for level in np.unique(weights.select_levels)]
+    most = np.array([gained[own].sum(axis=0) for own in levels])
+    level, band = np.unravel_index(int(np.argmax(most)), most.shape)
+    own, counts = levels[level], weights.counts[levels[level], band]
+    left = [float(np.sum(counts * fit.left[own, band])) for fit in (before, after)]
+    in_band = 1.0 - left[1] / left[0]
     return max(in_band, 1.0 - left_of(fitter, after, before)) if fitter.evidence.slow else in_band
 
 

@@ -1,10 +1,10 @@
 """Where to start fitting an effect: every seed tried alone, the best of them scaled and combined.
 
-A seed is a small effect of one shape. Where it should go, with the base parameters following, is
-predicted linearly (score test with the parent's Jacobian); the prediction is then tried at several
-sizes, and the seed with the parameters as they are, because neither smallness nor linearity can be
-relied on. Seeds that differ only in a phase by a quarter turn span all phases: their best
-combination is a seed of its own.
+A seed is an effect of one shape, most often a small one. Where it should go, with the base
+parameters following, is predicted linearly (score test with the parent's Jacobian); the prediction
+is then tried at several sizes, and the seed with the parameters as they are counts as well, because
+neither smallness nor linearity can be relied on. Seeds that differ only in a phase by a quarter
+turn span all phases: their best combination is a seed of its own.
 """
 
 from __future__ import annotations
@@ -50,7 +50,11 @@ class _Candidate:
 
 
 class Screening:
-    """The seeds of one effect beside a fit: what each promises, and starting points from them."""
+    """The seeds of one effect beside a fit: what each promises, and starting points from them.
+
+    Attributes:
+        gain: by how much the best seed lowers the parent's cost: predicted linearly, or as it is.
+    """
 
     def __init__(
         self,
@@ -77,12 +81,10 @@ class Screening:
         inverse = np.linalg.pinv(parent.jacobian, rcond=1e-6)
         self._candidates = _candidates(parent, seeds, changes, inverse, costs)
         self._seeds, self._changes = seeds, changes
+        self._plain = costs(parent.residuals + changes)
+        begun = float(costs(parent.residuals[None])[0])
         self._tries = _Tries(parent, model, inverse, space_of, errors, costs, largest)
-
-    @property
-    def gain(self) -> float:
-        """By how much the best seed would lower the parent's cost, predicted linearly."""
-        return self._candidates[0].gain
+        self.gain = max(self._candidates[0].gain, begun - float(self._plain.min()))
 
     def gain_beside(self, other: Solution, ratio: np.ndarray, costs: Costs) -> float:
         """Return what `gain` would be beside another fit, if the seeds changed the motion alike.
@@ -92,15 +94,21 @@ class Screening:
             ratio: (errors,), weights of the errors of the other's fit over those of the parent's.
             costs: what error vectors of the other fit cost.
         """
-        inverse = np.linalg.pinv(other.jacobian, rcond=1e-6)
-        return _candidates(other, self._seeds, self._changes * ratio, inverse, costs)[0].gain
+        inverse, changes = np.linalg.pinv(other.jacobian, rcond=1e-6), self._changes * ratio
+        begun, *plain = costs(np.vstack([other.residuals, other.residuals + changes]))
+        linear = _candidates(other, self._seeds, changes, inverse, costs)[0].gain
+        return max(linear, float(begun - min(plain)))
 
     def least(self) -> float:
         """Return the least cost of the best seeds, tried at the sizes that promise most."""
         if not self._tries.any:
             chosen = self._candidates[:_TRIED]
             self._tries.run([(c, size) for c in chosen for size in sorted({c.size, 1.0})])
-            self._tries.run([(c, 1.0) for c in chosen], "kept")
+            seeds = {id(seed) for seed in self._seeds}
+            combined = [c for c in chosen if id(c.seed) not in seeds]
+            self._tries.run([(c, 1.0) for c in combined], "kept")
+            order = np.argsort(self._plain, kind="stable")[:_TRIED]
+            self._tries.add([(self._seeds[k], self._changes[k]) for k in order], self._plain[order])
         return self._tries.proposals()[0][0]
 
     def proposals(self) -> list[Proposal]:
@@ -149,6 +157,15 @@ class _Tries:
             self._found.append((float(cost), candidate, point))
         self._found.sort(key=lambda one: one[0])
 
+    def add(
+        self, seeds: Sequence[tuple[Mapping[str, float], np.ndarray]], costs: np.ndarray
+    ) -> None:
+        """Take seeds that were evaluated as they are, with what they change, beside the parent."""
+        for (seed, change), cost in zip(seeds, costs, strict=True):
+            one = _Candidate(seed, change, 1.0, 0.0)
+            self._found.append((float(cost), one, self._point(one, 1.0, "kept")))
+        self._found.sort(key=lambda one: one[0])
+
     @property
     def any(self) -> bool:
         """Whether something was tried."""
@@ -156,7 +173,9 @@ class _Tries:
 
     def best(self, most: int) -> list[_Candidate]:
         """Return the candidates that did best so far."""
-        order = {id(c): c for _, c, _ in self._found}
+        order: dict[int, _Candidate] = {}
+        for _, candidate, _ in self._found:
+            order.setdefault(id(candidate.seed), candidate)
         return list(order.values())[:most]
 
     def proposals(self) -> list[Proposal]:
@@ -164,9 +183,9 @@ class _Tries:
         return [(cost, self._space(c), point) for cost, c, point in self._found]
 
     def _space(self, candidate: _Candidate) -> Space:
-        if id(candidate) not in self._spaces:
-            self._spaces[id(candidate)] = self._space_of(candidate.seed)
-        return self._spaces[id(candidate)]
+        if id(candidate.seed) not in self._spaces:
+            self._spaces[id(candidate.seed)] = self._space_of(candidate.seed)
+        return self._spaces[id(candidate.seed)]
 
     def run_straightened(self, candidates: Sequence[_Candidate]) -> None:
         """Evaluate candidates beside the datasheet, where the parent's parameters leave it far.
