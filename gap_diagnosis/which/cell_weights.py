@@ -109,11 +109,14 @@ class CellWeights:
             after: (parts, bands), mean squares that one fit leaves there, rad2.
             before: those of the other fit.
         """
+        return 0.5 * self.compared(after, before) * np.log(before / after)
+
+    def compared(self, after: np.ndarray, before: np.ndarray) -> np.ndarray:
+        """Return how many independent numbers tell two fits apart, (parts, bands); see `gained`."""
         known = self._noise[: self._evidence.bands]
         noise = np.minimum(known / np.minimum(before, after), 1.0)
         coherent = np.minimum(self._coherent[self.select_levels], self.counts)
-        numbers = independent(noise, self.counts, coherent)
-        return 0.5 * numbers * np.log(before / after)
+        return independent(noise, self.counts, coherent)
 
     def numbers(self, variance: np.ndarray) -> np.ndarray:
         """Return how many independent numbers each cell holds on the fitted parts, (cells,)."""

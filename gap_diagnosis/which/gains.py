@@ -107,21 +107,30 @@ def left_of(fitter: CellFitter, after: CellFit, before: CellFit) -> float:
 
 
 def closed(fitter: CellFitter, after: CellFit, before: CellFit) -> float:
-    """Return how much of what one fit leaves on unseen parts another closes, in one band.
+    """Return how much of what one fit leaves on unseen parts another closes, in a band or a level.
 
-    The band of the level in which it gains most log-likelihood: a delay shows at high frequencies
-    and friction in small motions, where little of the error is. Of the torque of a slow motion it
-    may be all bands together.
+    In the band in which it gains most log-likelihood: a delay shows at high frequencies, where
+    little of the motion is. Or in the level in which it gains most, the geometric mean over all
+    bands: friction shows in small motions, where little of the error is. Of the torque of a slow
+    motion it may be all bands together.
     """
     weights = fitter.weights
+    left = [np.sum(weights.counts * fit.left, axis=0) for fit in (before, after)]
     gained = weights.gained(after.left, before.left)
-    levels = [weights.select_levels == level for level in np.unique(weights.select_levels)]
-    most = np.array([gained[own].sum(axis=0) for own in levels])
-    level, band = np.unravel_index(int(np.argmax(most)), most.shape)
-    own, counts = levels[level], weights.counts[levels[level], band]
-    left = [float(np.sum(counts * fit.left[own, band])) for fit in (before, after)]
-    in_band = 1.0 - left[1] / left[0]
-    return max(in_band, 1.0 - left_of(fitter, after, before)) if fitter.evidence.slow else in_band
+    most = int(np.argmax(gained.sum(axis=0)))
+    in_band = float(1.0 - left[1][most] / left[0][most])
+    found = max(in_band, _closed_in_level(fitter, gained, after, before))
+    return max(found, 1.0 - left_of(fitter, after, before)) if fitter.evidence.slow else found
+
+
+def _closed_in_level(
+    fitter: CellFitter, gained: np.ndarray, after: CellFit, before: CellFit
+) -> float:
+    levels = fitter.weights.select_levels
+    numbers = fitter.weights.compared(after.left, before.left).sum(axis=1)
+    gains = np.bincount(levels, gained.sum(axis=1))
+    most = int(np.argmax(gains))
+    return float(1.0 - np.exp(-2.0 * gains[most] / np.bincount(levels, numbers)[most]))
 
 
 def _p_value(gains: np.ndarray) -> float:
