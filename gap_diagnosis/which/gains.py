@@ -29,6 +29,7 @@ _COUNTED = 5.0  # nats, the most that one of few parts counts
 _NEUTRAL = 0.02  # of the greatest gain of a part: parts that change by less say nothing
 NEARLY_ALL = 0.1
 """Of the squared error: what an explanation leaves that closes nearly all."""
+_GROWN = 1.1  # of the squared error: more is left than before, beyond what a refit moves
 _HELD = 0.02  # of the squared error of the part that holds most: less is not what is closed
 
 
@@ -111,16 +112,18 @@ def closed(fitter: CellFitter, after: CellFit, before: CellFit) -> float:
 
     In the band in which it gains most log-likelihood: a delay shows at high frequencies, where
     little of the motion is. Or in the level in which it gains most, the geometric mean over all
-    bands: friction shows in small motions, where little of the error is. Of the torque of a slow
-    motion it may be all bands together.
+    bands: friction shows in small motions, where little of the error is; unless the error of all
+    grows by it. Of the torque of a slow motion it may be all bands together.
     """
     weights = fitter.weights
     left = [np.sum(weights.counts * fit.left, axis=0) for fit in (before, after)]
     gained = weights.gained(after.left, before.left)
     most = int(np.argmax(gained.sum(axis=0)))
     in_band = float(1.0 - left[1][most] / left[0][most])
-    found = max(in_band, _closed_in_level(fitter, gained, after, before))
-    return max(found, 1.0 - left_of(fitter, after, before)) if fitter.evidence.slow else found
+    all_left = left_of(fitter, after, before)
+    if all_left < _GROWN:
+        in_band = max(in_band, _closed_in_level(fitter, gained, after, before))
+    return max(in_band, 1.0 - all_left) if fitter.evidence.slow else in_band
 
 
 def _closed_in_level(
