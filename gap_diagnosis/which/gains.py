@@ -129,11 +129,14 @@ def closed(fitter: CellFitter, after: CellFit, before: CellFit) -> float:
 def _closed_in_level(
     fitter: CellFitter, gained: np.ndarray, after: CellFit, before: CellFit
 ) -> float:
-    levels = fitter.weights.select_levels
-    numbers = fitter.weights.compared(after.left, before.left).sum(axis=1)
-    gains = np.bincount(levels, gained.sum(axis=1))
-    most = int(np.argmax(gains))
-    return float(1.0 - np.exp(-2.0 * gains[most] / np.bincount(levels, numbers)[most]))
+    weights = fitter.weights
+    most = int(np.argmax(np.bincount(weights.select_levels, gained.sum(axis=1))))
+    own = weights.select_levels == most
+    numbers = weights.compared(after.left, before.left)[own].sum(axis=0)
+    left = [np.sum((weights.counts * fit.left)[own], axis=0) for fit in (before, after)]
+    there = numbers > 0.0
+    fallen = np.log(left[1][there] / left[0][there])
+    return float(1.0 - np.exp(numbers[there] @ fallen / numbers[there].sum()))
 
 
 def _p_value(gains: np.ndarray) -> float:
