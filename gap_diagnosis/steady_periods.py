@@ -13,7 +13,7 @@ import numpy as np
 from fjr_records.noise import even_lines_as_noise
 from fjr_records.periodic import RecordedExperiment
 
-from .gates.bags_gate import bags_gate, friction_ordered
+from .gates.bags_gate import bags_gate, friction_follows_time
 from .gates.gate_checks import DISCRETISATION_LIMIT, GateReport, check_gates
 from .how_far.bla_gap import bla_gap
 from .how_far.steady_view import SteadyView
@@ -27,7 +27,7 @@ from .outcome.diagnosis import Diagnosis, NextExperiment
 from .verdict.judgement import stopped
 from .which.catalogue import catalogue
 from .which.cell_fits import DRIFT
-from .which.drift_gate import drift_gate, follows_time
+from .which.drift_gate import drift_gate
 
 UNSTEADY = (
     "The periods do not repeat as steady ones do, so the whole runs were searched for causes "
@@ -110,11 +110,13 @@ def _beside_drift(recorded: RecordedExperiment, order: Order) -> Investigation:
     """Diagnose whole runs, a drift of friction being one of the causes if it goes with time."""
     runs = recorded.as_records()
     whole = investigate_runs(runs, replace(order, drift=True))
-    if DRIFT not in whole.diagnosis.effects or whole.fitted is None:
+    if whole.fitted is None:
         return whole
-    if follows_time(whole.fitted.fitter, whole.fitted.found.best):
-        return whole
-    return investigate_runs(runs, order)
+    fits = [t.without for t in whole.fitted.tested if t.effect == DRIFT]
+    for fit in fits:
+        if not friction_follows_time(whole.fitted.evidence, fit.variance, fit.model):
+            return investigate_runs(runs, order)
+    return whole
 
 
 def _viewed(found: Investigation, view: SteadyView, order: Order) -> Investigation:
@@ -127,7 +129,7 @@ def _viewed(found: Investigation, view: SteadyView, order: Order) -> Investigati
     recorded, drift = view.recorded, False
     if told.verdict in ("unexplained", "partly_explained"):
         best = fitted.found.best
-        if friction_ordered(fitted.evidence, best.variance, best.model):
+        if friction_follows_time(fitted.evidence, best.variance, best.model):
             whole = _beside_drift(recorded, order)
             drift = DRIFT in whole.diagnosis.effects
             if drift and len(whole.diagnosis.effects) > 1:

@@ -172,14 +172,14 @@ def _trend(
     scatter = _scatter_leaving(degrees, deviation, std, design)
     found, covariance, _ = _regression(deviation, std, design, scatter)
     p = 2.0 * stats.t.sf(abs(found[-1]) / np.sqrt(covariance[-1, -1]), degrees)
-    if not _levels_agree(deviation, np.hypot(std, scatter), levels, elapsed_s):
+    if not levels_agree(deviation, np.hypot(std, scatter), levels, elapsed_s):
         p = 1.0
     if across:
         p = min(p, stats.kendalltau(elapsed_s, deviation).pvalue)
     return Trend(group, deviation, std, float(found[-1]), float(p))
 
 
-def _levels_agree(
+def levels_agree(
     deviation: np.ndarray, std: np.ndarray, levels: np.ndarray, elapsed_s: np.ndarray
 ) -> bool:
     """Tell whether two levels, or the only one, show a slope of the same sign.

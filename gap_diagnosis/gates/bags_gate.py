@@ -11,13 +11,12 @@ from ..model.evidence import Evidence
 from ..model.rig_model import Model
 from ..model.steady_runs import SteadyRuns
 from ..outcome.diagnosis import Bags, BagTrend, Estimate
-from .bag_changes import TREND_FALSE_ALARM, BagChanges, bag_changes
+from .bag_changes import TREND_FALSE_ALARM, BagChanges, bag_changes, levels_agree
 from .bag_deviations import run_errors
 from .gate_checks import Gate, untested
 
 SCATTER_SHOWN = 1e-3
 """Least relative scatter from bag to bag that a sentence mentions."""
-_ONE_WAY = 0.1  # chance that runs without a drift stand in such an order: then more is looked at
 
 
 def bags_gate(bags: Bags | None, recorded: RecordedExperiment) -> Gate:
@@ -71,20 +70,21 @@ def run_changes(evidence: Evidence, variance: np.ndarray, model: Model) -> BagCh
     return bag_changes(errors, levels, _times(evidence), model, blocks)
 
 
-def friction_ordered(evidence: Evidence, variance: np.ndarray, model: Model) -> bool:
-    """Tell whether friction goes one way from run to run, whatever law may be wrong.
+def friction_follows_time(evidence: Evidence, variance: np.ndarray, model: Model) -> bool:
+    """Tell whether friction goes one way in time, from run to run within levels.
 
-    Not whether it drifts: what a wrong law leaves may go one way from level to level.
+    Levels are recorded one after the other, as a rule. What a wrong law leaves is of another size
+    at each of them, and looks like a drift from level to level, but not within one.
 
     Args:
         evidence: the runs.
         variance: (cells,), of an error in each cell, rad2.
-        model: the best model.
+        model: the best model without a drift.
     """
     changes = run_changes(evidence, variance, model)
     own = [t for t in changes.trends if t.group == "friction"] if changes else []
-    p = [stats.kendalltau(_times(evidence), trend.deviation).pvalue for trend in own]
-    return bool(p) and p[0] <= _ONE_WAY
+    levels = np.array([r.level for r in evidence.records.records])
+    return any(levels_agree(t.deviation, t.std, levels, _times(evidence)) for t in own)
 
 
 def _times(evidence: Evidence) -> np.ndarray:

@@ -53,23 +53,6 @@ def drift_gate(fitter: CellFitter, refit: CellFit) -> Gate:
     )
 
 
-def follows_time(fitter: CellFitter, fit: CellFit) -> bool:
-    """Tell whether a fit with a drift is worse where the runs of each level change their order.
-
-    Levels are recorded one after the other, as a rule. What a wrong law leaves is of another size
-    at each of them, and looks like a drift from level to level, but not from run to run within one.
-
-    Args:
-        fitter: of whole runs that tell when they began.
-        fit: with the drift.
-    """
-    records = fitter.evidence.records
-    if len(records.levels) == len(records.records):
-        return False
-    other = _with_runs(fitter, _swapped(records))
-    return gain(fitter, fit, other.taken_over(fit)).present
-
-
 def _drift(fitter: CellFitter, refit: CellFit) -> tuple[Gain, float]:
     """Return what a drift gains on unseen parts, and its size in percent per second."""
     fit = fitter.add(refit, DRIFT, fitter.screening(refit, DRIFT).proposals())
@@ -86,13 +69,3 @@ def _with_runs(fitter: CellFitter, records: RecordSet) -> CellFitter:
 def _anew(records: RecordSet) -> RecordSet:
     """Return runs each of which starts as cold as the first."""
     return replace(records, records=tuple(replace(r, elapsed_s=0.0) for r in records.records))
-
-
-def _swapped(records: RecordSet) -> RecordSet:
-    """Return runs that began in the reverse order within each level."""
-    began = {
-        level: [r.elapsed_s for r in records.records if r.level == level]
-        for level in records.levels
-    }
-    anew = tuple(replace(r, elapsed_s=began[r.level].pop()) for r in records.records)
-    return replace(records, records=anew)

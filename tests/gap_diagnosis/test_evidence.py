@@ -191,10 +191,29 @@ def test_a_leading_fit_is_taken_to_its_end_before_it_is_compared(monkeypatch):
     assert fit.model.effects["torque_saturation.limit_nm"] == pytest.approx(60.0, rel=0.01)
 
 
+@pytest.mark.parametrize(("grown", "counts"), [(1.0, True), (2.0, False)])
+def test_a_cause_of_the_small_motions_closes_what_is_left_of_them(grown, counts):
+    """Friction is most of the error of a low level and little of all; unless all grows by it."""
+    fitter, refit, fit = biased()
+    low = fitter.weights.select_levels == 0
+    assert low.any() and not low.all()
+    before = np.where(low, 1.0, 1e4)[:, None] * np.full(refit.left.shape, 1e3 * NOISE**2)
+    after = before * np.where(low, 0.1, grown)[:, None]
+    quiet = replace(fit, left=after), replace(refit, left=before)
+    in_band = fitter.weights.gained(after, before).sum(axis=0).argmax()
+    squares = [(fitter.weights.counts * left)[:, in_band].sum() for left in (after, before)]
+    assert squares[0] > 0.99 * squares[1]
+    assert (closed(fitter, *quiet) == pytest.approx(0.9)) == counts
+
+
 def test_what_gains_but_closes_little_does_not_end_the_search(monkeypatch):
     """A lag shows in quiet parts; the limit beside which it does holds nearly all of the gap."""
     fitter, refit, fit = biased()
-    loudest = refit.left == refit.left.max(axis=0)
+    levels = fitter.weights.select_levels
+    loudest = np.zeros(refit.left.shape, bool)
+    for level in np.unique(levels):
+        own = refit.left[levels == level]
+        loudest[levels == level] = own == own.max(axis=0)
     left = np.where(loudest, 10.0, 1e-6) * refit.left
     quiet = replace(fit, effects=("delay",), left=left, acts=None)
     assert gain(fitter, quiet, refit).mean > gain(fitter, fit, refit).mean

@@ -17,9 +17,13 @@ from fjr_sim_node import effects as fx
 from fjr_sim_node.plant import PLANT, coefficients
 from fjr_sim_node.simulation.closed_loop import simulate
 from gap_diagnosis.any_record import investigate
+from gap_diagnosis.gates.bags_gate import friction_follows_time
 from gap_diagnosis.gates.gate_checks import check_gates
+from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.model.rig_model import Model
 from gap_diagnosis.steady_periods import UNSTEADY
+from gap_diagnosis.which.cell_fits import DRIFT, CellFitter
+from gap_diagnosis.which.gains import gain
 
 WARMING = {"nonstationary.friction_per_s": -0.02}
 LAG_S = 1e-3
@@ -125,3 +129,38 @@ def test_a_drift_of_a_rigid_axis_is_told_from_a_transient():
     assert found.steady.gates.only_unsteady
     assert found.steady.gates.gates[-1].name == "stationary within runs"
     assert found.diagnosis.verdict == "nonstationary"
+
+
+def test_a_drift_is_a_cause_beside_another_one_with_its_size():
+    warming = {"nonstationary.friction_per_s": -0.01}
+    case = simulate_case(
+        {"torque_bias.torque_nm": 3.0, **warming}, seed=4, realizations=3, **SHORT
+    )  # fmt: skip
+    found = investigate(case.recorded, PLANT.defaults()).diagnosis
+    assert found.effects == ["torque_bias", "nonstationary"] and found.notes[0] == UNSTEADY
+    (drift,) = found.causes[1].parameters.values()
+    assert drift.low < -0.01 < drift.high < -0.009
+
+
+@pytest.mark.parametrize("in_time", [True, False])
+def test_a_drift_goes_with_the_order_of_the_runs(in_time):
+    """What is other at each level looks like a drift of rigs that are recorded level by level."""
+    warming = {"nonstationary.friction_per_s": -0.01}
+    case = simulate_case(warming if in_time else {}, seed=4, realizations=3, **SHORT)
+    records = case.recorded.as_records()
+    if not in_time:
+        friction = dict.fromkeys(("fs", "fsm", "fv", "fvm"), 0.8)
+        plant = {n: friction.get(n, 1.0) * v for n, v in case.truth.plant.items()}
+        low = simulate_case({}, seed=4, realizations=3, plant=plant, **SHORT).recorded
+        changed = low.as_records().records
+        runs = tuple(
+            other if other.level == 0 else own
+            for own, other in zip(records.records, changed, strict=True)
+        )
+        records = replace(records, records=runs)
+    nominal = PLANT.defaults()
+    fitter = CellFitter(Evidence(records, nominal), nominal, 0.1)
+    refit = fitter.refit()
+    fit = fitter.add(refit, DRIFT, fitter.screening(refit, DRIFT).proposals())
+    assert fit is not None and gain(fitter, fit, refit).present
+    assert friction_follows_time(fitter.evidence, refit.variance, refit.model) == in_time

@@ -1,0 +1,48 @@
+"""Where an effect promises something: by a linear prediction, or by a seed as it is."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fjr_sim_node.plant import PLANT
+from gap_diagnosis.model.rig_model import Model
+from gap_diagnosis.which.least_squares import Solution
+from gap_diagnosis.which.screening import Screening
+from gap_diagnosis.which.search_space import Space
+
+NOMINAL = PLANT.defaults()
+HALF = 50
+SEED = {
+    "stribeck_friction_motor.torque_nm": 2.0,
+    "stribeck_friction_motor.velocity_rad_s": 0.1,
+}
+
+
+def errors(models: list[Model]) -> np.ndarray:
+    """Return errors of two cells; the effect at its seed clears the first, and the second grows."""
+    found = np.ones((len(models), 2 * HALF))
+    for row, model in zip(found, models, strict=True):
+        size = model.effects.get("stribeck_friction_motor.torque_nm", 0.0) / 2.0
+        row[:HALF] -= size
+        row[HALF:] += 1.2 * size
+    return found
+
+
+def costs(rows: np.ndarray) -> np.ndarray:
+    cells = rows.reshape(len(rows), 2, HALF)
+    return np.asarray(HALF * np.log(np.maximum(np.mean(cells**2, axis=2), 1e-4)).sum(axis=1))
+
+
+def test_a_seed_that_explains_much_as_it_is_counts_though_no_linear_prediction_does():
+    model = Model(NOMINAL, {})
+    base = len(NOMINAL)
+    jacobian = np.zeros((2 * HALF, base))
+    parent = Solution(np.zeros(base), 2.0 * HALF, jacobian, errors([model])[0], True)
+    space = Space(NOMINAL, tuple(SEED), tuple(SEED.values()))
+    screening = Screening(parent, model, [SEED], lambda _: space, errors, costs)
+    cleared = HALF * np.log(1e4) - 2 * HALF * np.log(2.2)
+    assert np.isclose(screening.gain, cleared)
+    cost, _, point = screening.proposals()[0]
+    assert np.isclose(cost, -cleared)
+    assert space.model(point).effects == SEED
+    assert np.isclose(screening.gain_beside(parent, np.ones(2 * HALF), costs), cleared)
