@@ -112,11 +112,11 @@ def _beside_drift(recorded: RecordedExperiment, order: Order) -> Investigation:
     whole = investigate_runs(runs, replace(order, drift=True))
     if whole.fitted is None:
         return whole
-    fits = [t.without for t in whole.fitted.tested if t.effect == DRIFT]
-    for fit in fits:
-        if not friction_follows_time(whole.fitted.evidence, fit.variance, fit.model):
-            return investigate_runs(runs, order)
-    return whole
+    evidence = whole.fitted.evidence
+    without = [t.without for t in whole.fitted.tested if t.effect == DRIFT]
+    if all(friction_follows_time(evidence, fit.variance, fit.model) for fit in without):
+        return whole
+    return investigate_runs(runs, order)
 
 
 def _viewed(found: Investigation, view: SteadyView, order: Order) -> Investigation:

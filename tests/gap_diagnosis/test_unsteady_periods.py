@@ -133,9 +133,8 @@ def test_a_drift_of_a_rigid_axis_is_told_from_a_transient():
 
 def test_a_drift_is_a_cause_beside_another_one_with_its_size():
     warming = {"nonstationary.friction_per_s": -0.01}
-    case = simulate_case(
-        {"torque_bias.torque_nm": 3.0, **warming}, seed=4, realizations=3, **SHORT
-    )  # fmt: skip
+    causes = {"torque_bias.torque_nm": 3.0, **warming}
+    case = simulate_case(causes, seed=4, realizations=3, **SHORT)
     found = investigate(case.recorded, PLANT.defaults()).diagnosis
     assert found.effects == ["torque_bias", "nonstationary"] and found.notes[0] == UNSTEADY
     (drift,) = found.causes[1].parameters.values()
