@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from fjr_interface.parameter_file import load_parameter_file
-from fjr_interface.parameters import nearest
-from fjr_kit.errors import InputError, shown
+from fjr_kit.errors import InputError
 from fjr_sim_node import effects, plant
 from fjr_sim_node.simulation.simulator import SIMULATOR
 
@@ -106,11 +105,7 @@ def read_joint(path: Path | str, without: Collection[str] = ()) -> Joint:
             f"{path}: /rig/simulator is missing; give the updated.yaml of a diagnosis, or write "
             "the joint's values below it."
         )
-    for name in without:
-        if name not in effects.EFFECTS:
-            raise InputError(
-                f"There is no effect {shown(name)}; did you mean {nearest(name, effects.EFFECTS)}?"
-            )
+    effects.demand(without)
     values = SIMULATOR.check(given, f"{path}: /rig/simulator")
     if math.isinf(values["j"]):
         raise InputError(

@@ -16,10 +16,13 @@ Parameter names in files and in ROS are `effect.parameter`.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from typing import Any
 
 import numpy as np
+
+from fjr_interface.parameters import nearest
+from fjr_kit.errors import InputError, shown
 
 from .drive import DRIVE, ENCODER
 from .entry import Effect, EffectParameter
@@ -36,6 +39,7 @@ __all__ = [
     "EffectParameter",
     "coefficients",
     "contains",
+    "demand",
     "holders",
     "near_equivalents",
     "parameter",
@@ -75,6 +79,15 @@ def __getattr__(name: str) -> int:
         return _PLACES[name]
     except KeyError:
         raise AttributeError(f"the table of effects has no parameter {name}") from None
+
+
+def demand(identifiers: Iterable[str]) -> None:
+    """Raise InputError where an identifier is that of no effect, with the nearest ones."""
+    for name in identifiers:
+        if name not in EFFECTS:
+            raise InputError(
+                f"There is no effect {shown(name)}; did you mean {nearest(name, EFFECTS)}?"
+            )
 
 
 def parameter(name: str) -> EffectParameter:

@@ -23,11 +23,7 @@ def catalogue(nominal: Mapping[str, float], asked: Sequence[str] | None = None) 
     Raises:
         InputError: an identifier of no effect, or none that this rig can have.
     """
-    for name in asked or ():
-        if name not in fx.EFFECTS:
-            raise InputError(
-                f"effects: {name} is no effect; the effects are {', '.join(fx.EFFECTS)}."
-            )
+    fx.demand(asked or ())
     found = [
         name
         for name in possible_effects(nominal)

@@ -175,7 +175,7 @@ def test_an_effect_that_cannot_be_played_beside_a_nominal_has_a_reason(monkeypat
 
 
 def test_an_effect_that_is_none_is_refused():
-    with pytest.raises(InputError, match="backlsh is no effect"):
+    with pytest.raises(InputError, match="no effect 'backlsh'; did you mean backlash"):
         foresee(planned_record(planned(0.0)), NOMINAL, effects=["backlsh"])
 
 

@@ -242,7 +242,7 @@ def refused(done, *words):
 def test_an_effect_of_an_unknown_name_is_one_sentence(run, bags, tmp_path):
     out = tmp_path / "out"
     done = run("diagnose", bags, "--nominal", "paper", "--effects", "gravity,slop", "--out", out)
-    refused(done, "slop is no effect; the effects are")
+    refused(done, "There is no effect 'slop'; did you mean")
     assert not out.exists()
 
 
