@@ -114,7 +114,7 @@ def import_records(
         controllers=tuple(controller or ()),
     )
     understood = read_files(files, options)
-    for line in summary(understood, options.columns):
+    for line in summary(understood):
         typer.echo(line)
     for record in understood.records:
         for doubt in record.doubts:

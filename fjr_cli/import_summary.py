@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
 from fjr_interface.experiment import Experiment, RecordDescription
 from fjr_records.importers.columns import held_columns
-from fjr_records.importers.import_map import Column
 from fjr_records.importers.importer import Understood
 from fjr_records.importers.record_file import SYMBOLS, Record
 from fjr_records.importers.repetition import Repetition
@@ -37,16 +36,14 @@ def held_by(path: Path) -> Iterator[str]:
     )
 
 
-def summary(understood: Understood, columns: Mapping[str, Column]) -> Iterator[str]:
+def summary(understood: Understood) -> Iterator[str]:
     """Yield the lines of the summary: each file, then what they are together."""
     for record, one in zip(understood.records, understood.descriptions, strict=True):
-        yield from _file(record, one, columns)
+        yield from _file(record, one)
     yield from _together(understood)
 
 
-def _file(
-    record: Record, one: Experiment | RecordDescription, columns: Mapping[str, Column]
-) -> Iterator[str]:
+def _file(record: Record, one: Experiment | RecordDescription) -> Iterator[str]:
     seconds = record.samples / record.sample_rate_hz
     yield (
         f"{record.path.name}: level {one.level}, realization {one.realization}: {seconds:.6g} s at "
@@ -59,12 +56,11 @@ def _file(
                 yield f"  {quantity:<10} not recorded"
             continue
         values, unit = record.signals[symbol], units[quantity]
-        column = columns.get(quantity)
-        source = (
-            "made by the controller"
-            if column is None
-            else f"{column.name}, times {column.factor:.6g}"
-        )
+        column = record.columns.get(quantity)
+        source = "made by the controller"
+        if column is not None:
+            stated = f" in {column.unit} as the file says" if column.stated else ""
+            source = f"{column.name}{stated}, times {column.factor:.6g}"
         yield (
             f"  {quantity:<10} rms {np.sqrt(np.mean(values**2)):.4g} {unit}, from "
             f"{values.min():.4g} to {values.max():.4g} {unit} ({source})"

@@ -13,7 +13,7 @@ from fjr_interface.bags.audit import LARGEST
 from fjr_kit.errors import InputError
 
 from . import json_log, mat, npz, text
-from .source import Names, refuse_bomb, sample_axis
+from .source import Heading, Names, refuse_bomb, sample_axis
 
 Result = TypeVar("Result")
 
@@ -32,7 +32,9 @@ READERS: dict[str, Callable[[Path], Names]] = {
 _TEXTS = tuple(suffix for suffix in READERS if suffix not in (".mat", ".npz"))
 
 
-def read_columns(path: str | Path, names: Sequence[str]) -> dict[str, np.ndarray]:
+def read_columns(
+    path: str | Path, names: Sequence[str]
+) -> tuple[dict[str, np.ndarray], dict[str, Heading]]:
     """Read named columns of a file.
 
     A field of a structure is named `structure.field`, a signal in a matrix `matrix[0]`, counted
@@ -43,7 +45,7 @@ def read_columns(path: str | Path, names: Sequence[str]) -> dict[str, np.ndarray
         names: the columns to read.
 
     Returns:
-        {name: float64 (samples,)}.
+        {name: float64 (samples,)}, and what the file says of each.
 
     Raises:
         InputError: the file cannot be read, lacks a column (those that are there are named), or a
@@ -51,10 +53,11 @@ def read_columns(path: str | Path, names: Sequence[str]) -> dict[str, np.ndarray
     """
     path = Path(path)
 
-    def numbers(found: Names) -> dict[str, np.ndarray]:
-        return {name: _numbers(path, name, found.column(name)) for name in names}
+    def columns(found: Names) -> tuple[dict[str, np.ndarray], dict[str, Heading]]:
+        numbers = {name: _numbers(path, name, found.column(name)) for name in names}
+        return numbers, {name: found.headings.get(name, Heading(name)) for name in names}
 
-    return _of_file(path, numbers)
+    return _of_file(path, columns)
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ from fjr_interface.experiment import Experiment, RecordDescription
 from fjr_kit.errors import InputError
 
 from ..lines import classify
-from .import_map import Column, is_linear
+from .import_map import is_linear
 from .record_file import Record
 from .repetition import Repetition
 
@@ -35,7 +35,6 @@ def describe(
     records: Sequence[Record],
     levels: int,
     controllers: Sequence[dict[str, Any] | None],
-    columns: Mapping[str, Column],
 ) -> tuple[list[Description], list[str]]:
     """Describe each record.
 
@@ -43,7 +42,6 @@ def describe(
         records: level by level, equally many of each.
         levels: how many amplitudes they hold.
         controllers: what is known of the controller, for each record.
-        columns: where its quantities stood.
 
     Returns:
         Their descriptions, of one kind, and sentences on what differs between them.
@@ -52,13 +50,15 @@ def describe(
         InputError: they do not belong into one experiment.
     """
     _check_rates(records)
+    _check_kinds(records)
     each_level = len(records) // levels
     notes: list[str] = []
     found: list[Description] = []
     periodic = all(isinstance(record.repetition, Repetition) for record in records)
     lines = _common_lines(records, notes) if periodic else None
-    axis = {"axis": "linear"} if is_linear(columns) else {}
-    speed = {"position_from": "speed"} if columns["position"].is_speed else {}
+    axis = {"axis": "linear"} if is_linear(records[0].columns) else {}
+    from_speed = records[0].columns["position"].is_speed
+    speed = {"position_from": "speed"} if from_speed else {}
     for level in range(levels):
         part = slice(level * each_level, (level + 1) * each_level)
         inside = records[part]
@@ -73,7 +73,7 @@ def describe(
                 "levels": levels,
                 "repeat_of": repeats[number],
                 "controller": controllers[part][number],
-                "imported": _source(record, columns),
+                "imported": _source(record),
                 **axis,
                 **speed,
             }
@@ -97,9 +97,24 @@ def describe(
     return found, notes
 
 
-def _source(record: Record, columns: Mapping[str, Column]) -> dict[str, Any]:
-    named = {quantity: [c.name, c.factor] for quantity, c in columns.items()}
+def _source(record: Record) -> dict[str, Any]:
+    named = {quantity: [c.name, c.factor] for quantity, c in record.columns.items()}
     return {"file": record.path.name, "columns": named}
+
+
+def _check_kinds(records: Sequence[Record]) -> None:
+    """Refuse files of which one states an angle and the other a length or a speed."""
+    first = records[0]
+    for record in records[1:]:
+        one, other = first.columns, record.columns
+        if (is_linear(one), one["position"].is_speed) != (
+            is_linear(other),
+            other["position"].is_speed,
+        ):
+            raise InputError(
+                f"{first.path} and {record.path} state units of different kinds; give the units "
+                "in --map, or import them as experiments of their own."
+            )
 
 
 def _check_rates(records: Sequence[Record]) -> None:

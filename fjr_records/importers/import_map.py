@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 from fjr_kit.errors import InputError
+
+from .source import Heading
+from .stated_units import stated_unit, unit_of
 
 _ANGLE = {"rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "deg": math.pi / 180.0, "rev": 2.0 * math.pi}
 _TORQUE = {"N m": 1.0, "Nm": 1.0, "mN m": 1e-3, "mNm": 1e-3, "kN m": 1e3, "kNm": 1e3}
@@ -42,13 +46,15 @@ class Column:
         factor: to SI, with the sign.
         by_factor: whether the factor was given as a number, so that the column may be anything: a
             current that stands for the torque, a voltage that stands for the reference.
-        unit: in which it was given to be; empty if none was.
+        unit: in which it was given to be, or else the file states it to be; empty if neither.
+        stated: whether the unit is the one that the file states.
     """
 
     name: str
     factor: float = 1.0
     by_factor: bool = False
     unit: str = ""
+    stated: bool = False
 
     @property
     def is_speed(self) -> bool:
@@ -61,7 +67,8 @@ class Column:
         name, _, unit = text.partition(":")
         sign, name = (-1.0, name[1:]) if name.startswith("-") else (1.0, name)
         units = UNITS[quantity]
-        factor = units.get(unit or next(iter(units)))
+        known = unit_of(unit, units) or "" if unit else next(iter(units))
+        factor = units.get(known)
         if factor is None:
             try:
                 factor = float(unit) if unit.isascii() else math.nan
@@ -72,8 +79,34 @@ class Column:
                 f"{quantity}={text} is not understood; write {quantity}=[-]column[:unit] with one "
                 f"of the units {', '.join(units)}, or with a factor to {next(iter(units))}."
             )
-        known = unit in units
-        return cls(name.strip(), sign * factor, bool(unit) and not known, unit if known else "")
+        return cls(name.strip(), sign * factor, not known, known if unit else "")
+
+    def read_as(self, path: Path, quantity: str, heading: Heading) -> Column:
+        """Return the column in the unit that a file states of it, where the map gave none.
+
+        Raises:
+            InputError: the file states a unit that is none of the quantity.
+        """
+        units = UNITS[quantity]
+        stated = stated_unit(heading.title, heading.unit, units)
+        if not stated or self.unit or self.by_factor:
+            return self
+        if stated not in units:
+            default = next(iter(units))
+            raise InputError(
+                f"{path}: {quantity} is mapped to {heading.title}, which the file says to be in "
+                f"{stated}; give the factor that leads to {default}, as in {quantity}={self.name}"
+                ":0.25, or map another column."
+            )
+        return replace(self, factor=self.factor * units[stated], unit=stated, stated=True)
+
+    def contradiction(self, quantity: str, heading: Heading) -> str | None:
+        """Return what a file states against the unit that the map gave; None if nothing."""
+        units = UNITS[quantity]
+        stated = stated_unit(heading.title, heading.unit, units)
+        if not self.unit or not stated or units.get(stated) == units[self.unit]:
+            return None
+        return f"{quantity} is taken in {self.unit}, though its column says {stated}"
 
 
 def parse_map(specs: Sequence[str], *, described: bool = False) -> dict[str, Column]:
@@ -111,7 +144,7 @@ def parse_map(specs: Sequence[str], *, described: bool = False) -> dict[str, Col
                 "controller that made it (--controller)"
             )
         raise InputError(f"the map lacks {' and '.join(missing)}; add {missing[0]}=column{made}.")
-    _refuse_both_axes(columns)
+    refuse_both_axes("the map", columns)
     return columns
 
 
@@ -120,14 +153,19 @@ def is_linear(columns: Mapping[str, Column]) -> bool:
     return any(column.unit in LINEAR for column in columns.values())
 
 
-def _refuse_both_axes(columns: Mapping[str, Column]) -> None:
-    """Raise InputError if some units are those of a linear axis and others of a rotary one."""
+def refuse_both_axes(source: str, columns: Mapping[str, Column]) -> None:
+    """Raise InputError if some units are those of a linear axis and others of a rotary one.
+
+    Args:
+        source: what gives or states the units.
+        columns: the column of each quantity.
+    """
     given = {q: c.unit for q, c in columns.items() if c.unit and q != "time"}
     linear = [f"{quantity} in {unit}" for quantity, unit in given.items() if unit in LINEAR]
     rotary = [f"{quantity} in {unit}" for quantity, unit in given.items() if unit not in LINEAR]
     if linear and rotary:
         raise InputError(
-            f"the map has {linear[0]}, as of a linear axis, and {rotary[0]}, as of a rotary one; "
+            f"{source} has {linear[0]}, as of a linear axis, and {rotary[0]}, as of a rotary one; "
             "give m and N, or rad and N m."
         )
 

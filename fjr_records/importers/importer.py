@@ -76,7 +76,7 @@ def read_files(files: Sequence[str | Path], options: ImportOptions) -> Understoo
     ]
     for record, controller, source in zip(records, controllers, sources, strict=False):
         _check_controller(record, controller or {}, source)
-    descriptions, notes = describe(records, options.levels, controllers, options.columns)
+    descriptions, notes = describe(records, options.levels, controllers)
     return Understood(tuple(records), tuple(descriptions), tuple(notes))
 
 

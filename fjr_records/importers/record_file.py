@@ -15,7 +15,7 @@ from ..driven import wrong_sign
 from ..units import may_stick
 from . import coherence
 from .columns import read_columns
-from .import_map import Column
+from .import_map import Column, refuse_both_axes
 from .integrals import DRIFTS, integrals
 from .made_torque import MADE, made_torque
 from .repetition import Repetition, find_repetition, insists
@@ -64,15 +64,19 @@ class Samples:
 
     Attributes:
         path: the file.
+        columns: where each quantity stands, in the unit that it was given or is stated in.
         values: {quantity: float64 (samples,)}, without time.
         timing: what its time column says.
         notes: what was done to them.
+        doubts: what is evidently wrong, but might be meant.
     """
 
     path: Path
+    columns: Mapping[str, Column]
     values: Mapping[str, np.ndarray]
     timing: Timing
     notes: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -81,6 +85,7 @@ class Record:
 
     Attributes:
         path: the file.
+        columns: where each quantity stands, in the unit that it was given or is stated in.
         sample_rate_hz: rate of the grid.
         signals: {symbol: float64 (samples,)} in SI.
         timing: what its time column says.
@@ -90,6 +95,7 @@ class Record:
     """
 
     path: Path
+    columns: Mapping[str, Column]
     sample_rate_hz: float
     signals: Mapping[str, np.ndarray]
     timing: Timing
@@ -105,8 +111,10 @@ class Record:
 
 def read_samples(path: Path, options: ImportOptions) -> Samples:
     """Read the columns of one file; raise InputError."""
-    columns = options.columns
-    arrays = read_columns(path, [column.name for column in columns.values()])
+    given = options.columns
+    arrays, headings = read_columns(path, [column.name for column in given.values()])
+    columns = {q: each.read_as(path, q, headings[each.name]) for q, each in given.items()}
+    refuse_both_axes(f"{path}:", columns)
     unsigned = [
         q for q, column in columns.items() if q != "time" and _lost_sign(arrays[column.name])
     ]
@@ -152,7 +160,8 @@ def read_samples(path: Path, options: ImportOptions) -> Samples:
             f"{path}: {left} samples at {timing.rate_hz:g} Hz are no record; give at least "
             f"{LEAST_SAMPLES} samples, in at most {LONGEST_S:g} s."
         )
-    return Samples(path, values, timing, notes)
+    said = (each.contradiction(q, headings[each.name]) for q, each in columns.items())
+    return Samples(path, columns, values, timing, notes, tuple(doubt for doubt in said if doubt))
 
 
 def _lost_sign(column: np.ndarray) -> bool:
@@ -174,12 +183,12 @@ def understand(
         options: how to understand them.
         law: what makes a torque that was not recorded.
     """
-    path, timing, values = samples.path, samples.timing, samples.values
+    path, columns, timing, values = samples.path, samples.columns, samples.timing, samples.values
     notes = (*samples.notes, *timing.notes)
     if timing.stamps_s is not None:
         values, errors = resample(path, timing, values, rate_hz)
         notes += errors
-    values, integrated = integrals(values, options.columns, rate_hz)
+    values, integrated = integrals(values, columns, rate_hz)
     notes += integrated
     signals = {SYMBOLS[quantity]: each for quantity, each in values.items()}
     if law is not None and "u" not in signals:
@@ -188,12 +197,12 @@ def understand(
     if not np.ptp(signals["y"]) > 0:
         raise InputError(f"{path}: the position is constant; map the column that carries it.")
     found: Repetition | str = DRIFTS
-    if not options.columns["position"].is_speed:
+    if not columns["position"].is_speed:
         found = find_repetition(str(path), signals, rate_hz, options)
     elif insists(options):
         raise InputError(f"{path}: {DRIFTS}; leave out what is said of its periods and lines.")
     repetition = found if isinstance(found, Repetition) else None
-    doubts = _unit_doubts(path, signals, repetition, options.columns)
+    doubts = samples.doubts + _unit_doubts(path, signals, repetition, columns)
     if not np.ptp(signals["u"]) > 0:
         doubts += ("the torque is constant, so no response can be told from this run",)
     brakes = wrong_sign(signals["u"], signals["y"])
@@ -205,7 +214,7 @@ def understand(
     if repetition is not None:
         signals = {symbol: each[: repetition.samples] for symbol, each in signals.items()}
         notes += repetition.notes
-    return Record(path, rate_hz, signals, timing, found, notes, doubts)
+    return Record(path, columns, rate_hz, signals, timing, found, notes, doubts)
 
 
 def _unit_doubts(

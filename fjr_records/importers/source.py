@@ -5,8 +5,8 @@ from __future__ import annotations
 import gzip
 import re
 import zlib
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,19 @@ _SHOWN = 20
 
 
 @dataclass(frozen=True)
+class Heading:
+    """What a file says of a column.
+
+    Attributes:
+        title: its name.
+        unit: what stands of it in a row of units; empty if there is none.
+    """
+
+    title: str
+    unit: str = ""
+
+
+@dataclass(frozen=True)
 class Names:
     """The columns of an open file.
 
@@ -31,12 +44,14 @@ class Names:
         known: the names that are there.
         find: returns the array of a name.
         unlisted: names that `find` takes as well, but that no sentence lists.
+        headings: of names that are not their own title, or of which more is said.
     """
 
     path: Path
     known: Sequence[str]
     find: Callable[[str], Any]
     unlisted: Sequence[str] = ()
+    headings: Mapping[str, Heading] = field(default_factory=dict)
 
     def column(self, name: str) -> np.ndarray:
         """Return the array `name`, or the signal i of a matrix for `name[i]`; raise InputError."""

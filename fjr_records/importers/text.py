@@ -12,7 +12,7 @@ import numpy as np
 
 from fjr_kit.errors import InputError, shown
 
-from .source import Names, read_text
+from .source import Heading, Names, read_text
 
 _DELIMITERS = ("\t", ";", ",", "|", None)
 """None stands for white space."""
@@ -66,9 +66,12 @@ def open_text(path: Path) -> Names:
     text = read_text(path)
     first = [line for _, line in _lines(text, _LOOKED_AT)]
     layout = max(_LAYOUTS, key=lambda one: _fitness(one, first))
-    start, names = _start(layout, text)
+    start, names, units = _start(layout, text)
     places = {name: at for at, name in reversed(list(enumerate(names)))}
     numbers = [each for at in range(len(names)) for each in (str(at), f"[{at}]")]
+    titled = [Heading(name, units[at] if units else "") for at, name in enumerate(names)]
+    headings = {number: titled[int(number.strip("[]"))] for number in numbers}
+    headings |= {name: titled[at] for name, at in places.items()}
 
     def find(name: str) -> np.ndarray:
         if names.count(name) > 1:
@@ -79,7 +82,7 @@ def open_text(path: Path) -> Names:
         index = places[name] if name in places else int(name.strip("[]"))
         return _column(path, layout, text, start, index, len(names), name)
 
-    return Names(path, names, find, numbers)
+    return Names(path, names, find, numbers, headings)
 
 
 def _lines(text: str, most: int | None = None) -> Iterator[tuple[int, str]]:
@@ -108,11 +111,12 @@ def _is_comment(line: str) -> bool:
     return line.lstrip().startswith(_COMMENTS)
 
 
-def _start(layout: _Layout, text: str) -> tuple[int, list[str]]:
-    """Return the number of the first line of numbers, and the names of the columns.
+def _start(layout: _Layout, text: str) -> tuple[int, list[str], list[str]]:
+    """Return the number of the first line of numbers, the names of the columns, and their units.
 
-    The names stand in one of the two lines above, the other may hold units; without names the
-    columns are numbered. A line above in which some cells are numbers is a damaged row.
+    The names stand in one of the two lines above, the other may hold units, else none are
+    returned; without names the columns are numbered. A line above in which some cells are numbers
+    is a damaged row.
     """
     above: list[tuple[int, list[str], bool]] = []
     for number, line in _lines(text, _LOOKED_AT):
@@ -125,13 +129,13 @@ def _start(layout: _Layout, text: str) -> tuple[int, list[str]]:
         fitting = [each for each in above if len(each[1]) == width]
         for row, names, comment in fitting:
             if not comment and any(map(layout.is_number, names)):
-                return row, [str(index) for index in range(width)]
+                return row, [str(index) for index in range(width)], []
         if fitting:
-            return number, fitting[0][1]
+            return number, fitting[0][1], fitting[1][1] if len(fitting) > 1 else []
         if above and not above[0][2] and layout.delimiter is not None and len(above[0][1]) > 1:
-            return number, above[0][1]  # the rows are said to be too short or too long
-        return number, [str(index) for index in range(width)]
-    return _NOWHERE, above[0][1] if above else []
+            return number, above[0][1], []  # the rows are said to be too short or too long
+        return number, [str(index) for index in range(width)], []
+    return _NOWHERE, above[0][1] if above else [], []
 
 
 def _column(

@@ -54,7 +54,7 @@ def test_text(tmp_path, name):
     write = gzip.compress if name.endswith(".gz") else bytes
     (tmp_path / name).write_bytes(write(text.encode()))
     for found, expected in zip(
-        read_columns(tmp_path / name, list(names)).values(), (R, Y), strict=True
+        read_columns(tmp_path / name, list(names))[0].values(), (R, Y), strict=True
     ):
         np.testing.assert_array_equal(found, expected)
 
@@ -66,7 +66,7 @@ def test_what_a_text_holds_can_be_read_by_the_names_that_are_listed(tmp_path, na
     (tmp_path / name).write_bytes(write(text.encode()))
     held, more = held_columns(tmp_path / name)
     assert more == 0
-    read = read_columns(tmp_path / name, [one.name for one in held])
+    read = read_columns(tmp_path / name, [one.name for one in held])[0]
     assert len(held) == 3
     for one, column in zip(held, read.values(), strict=True):
         assert one.shape == (40,) and one.range == (column.min(), column.max())
@@ -91,7 +91,7 @@ def test_a_file_of_many_columns_says_how_many_are_not_shown(tmp_path):
 @pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "latin-1"])
 def test_names_in_any_encoding(tmp_path, encoding):
     (tmp_path / "rig.csv").write_bytes(("t,µ (°),y\n" + table(",")).encode(encoding))
-    np.testing.assert_array_equal(read_columns(tmp_path / "rig.csv", ["µ (°)"])["µ (°)"], R)
+    np.testing.assert_array_equal(read_columns(tmp_path / "rig.csv", ["µ (°)"])[0]["µ (°)"], R)
 
 
 JSONS = {
@@ -109,7 +109,7 @@ def test_json(tmp_path, name, suffix):
     packed = gzip.compress if suffix.endswith(".gz") else bytes
     (tmp_path / f"log{suffix}").write_bytes(packed(json.dumps(content).encode()))
     names = [path.format(each) for each in "ry"]
-    found = read_columns(tmp_path / f"log{suffix}", names)
+    found = read_columns(tmp_path / f"log{suffix}", names)[0]
     np.testing.assert_array_equal(list(found.values()), [R, Y])
     with pytest.raises(InputError, match=rf"there is no speed; the file holds .*{names[0]}"):
         read_columns(tmp_path / f"log{suffix}", ["speed"])
@@ -117,20 +117,21 @@ def test_json(tmp_path, name, suffix):
 
 def test_json_of_rows_and_of_lines(tmp_path):
     (tmp_path / "rows.json").write_text(json.dumps({"data": ROWS}))
-    np.testing.assert_array_equal(read_columns(tmp_path / "rows.json", ["data[2]"])["data[2]"], Y)
+    found = read_columns(tmp_path / "rows.json", ["data[2]"])[0]
+    np.testing.assert_array_equal(found["data[2]"], Y)
     lines = "\n".join(json.dumps({"t": t, "y": y}) for t, _, y in ROWS)
     (tmp_path / "log.jsonl").write_text(lines)
-    np.testing.assert_array_equal(read_columns(tmp_path / "log.jsonl", ["y"])["y"], Y)
+    np.testing.assert_array_equal(read_columns(tmp_path / "log.jsonl", ["y"])[0]["y"], Y)
 
 
 def test_json_of_one_line_is_one_entry(tmp_path):
     (tmp_path / "rig.jsonl").write_text('{"r": 1.5, "y": 2}\n')
-    assert read_columns(tmp_path / "rig.jsonl", ["r"])["r"].tolist() == [1.5]
+    assert read_columns(tmp_path / "rig.jsonl", ["r"])[0]["r"].tolist() == [1.5]
 
 
 def test_mat_with_signals_in_rows(tmp_path):
     savemat(tmp_path / "rig.mat", {"rec": {"pos": np.stack([R, Y]), "t": T[None, :]}})
-    found = read_columns(tmp_path / "rig.mat", ["rec.pos[1]", "rec.t"])
+    found = read_columns(tmp_path / "rig.mat", ["rec.pos[1]", "rec.t"])[0]
     np.testing.assert_array_equal(list(found.values()), [Y, T])
     with pytest.raises(InputError, match=r"a matrix \(2 x 40\); name one of its rows, such as rec"):
         read_columns(tmp_path / "rig.mat", ["rec.pos"])
@@ -143,7 +144,7 @@ def test_mat_of_version_7_3(tmp_path):
         file["rec/t"] = T[:, None]
     with (tmp_path / "rig.mat").open("r+b") as file:
         file.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64")
-    found = read_columns(tmp_path / "rig.mat", ["rec.pos[1]", "rec.t"])
+    found = read_columns(tmp_path / "rig.mat", ["rec.pos[1]", "rec.t"])[0]
     np.testing.assert_array_equal(list(found.values()), [Y, T])
     with (tmp_path / "rig.mat").open("r+b") as file:
         file.truncate(900)
@@ -229,7 +230,7 @@ def test_whatever_the_bytes_there_are_numbers_or_a_sentence(tmp_path_factory, su
     file.write_bytes(content)
     for names in (["r", "y"], ["0"], ["s.m[1]"]):
         try:
-            found = read_columns(file, names)
+            found = read_columns(file, names)[0]
         except InputError as refused:
             assert "\n" not in str(refused) and str(refused).startswith(str(file))
         else:
