@@ -100,11 +100,17 @@ class Parameter:
         return f"{text}; range {self.range_text}" if bounded else text
 
 
+_NEAR = 0.6
+"""Likeness of two words of which one is meant by the other, by `difflib`."""
+
+
 def nearest(name: Any, names: Iterable[str]) -> str:
-    """Return the name that is near to another one, or the two nearest ones if none is."""
+    """Return the name that is near to another one, or two where they are alike or none is near."""
     word, known = str(name)[:100], list(names)
-    close = difflib.get_close_matches(word, known, 1)
-    return " or ".join(close or difflib.get_close_matches(word, known, 2, 0.0))
+    likeness = {each: difflib.SequenceMatcher(None, each, word).ratio() for each in known}
+    two = sorted(known, key=lambda each: -likeness[each])[:2]
+    alone = len(two) > 1 and likeness[two[0]] > max(_NEAR, likeness[two[1]])
+    return two[0] if alone else " or ".join(two)
 
 
 class ParameterGroup:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from controller_node.pd_filtered import CONTROLLER
 from excitation_node.multisine import EXCITATION
-from fjr_interface.parameters import Parameter, ParameterGroup
+from fjr_interface.parameters import Parameter, ParameterGroup, nearest
 from fjr_kit.errors import InputError
 from fjr_sim_node.plant import PLANT
 
@@ -83,6 +83,7 @@ def test_good_values_take_the_type_of_the_parameter(values, expected):
         ({"levels": [1.0, 4.0]}, "levels must lie in [0, 3] rad, not 4.0."),
         ({"levels": None}, "levels must be a list of numbers, not None."),
         ({"gian": 1.0}, "There is no parameter 'gian'; did you mean gain?"),
+        ({"nam": 1.0}, "There is no parameter 'nam'; did you mean name?"),
         ({"xe": 1.0}, "There is no parameter 'xe'; did you mean name or levels?"),
         ({"levels": "12"}, "levels must be a list of numbers, not '12'."),
         (
@@ -125,3 +126,11 @@ def test_any_value_is_taken_in_range_or_refused(name, value):
     for item in checked if isinstance(checked, tuple) else (checked,):
         if isinstance(item, (int, float)):
             assert parameter.low <= item <= parameter.high
+
+
+def test_names_that_are_alike_are_both_proposed():
+    assert nearest("k", ["jm", "k0", "k1"]) == "k0 or k1"
+    assert nearest("k10", ["jm", "k1", "k0"]) == "k1 or k0"
+    assert nearest("jn", ["j", "jm", "k0"]) == "j"
+    assert nearest("x", ["jm"]) == "jm"
+    assert nearest("x", []) == ""
