@@ -28,25 +28,28 @@ def score_check(check: BlindCheck, *, unfinished: bool = False) -> Path:
     Raises:
         InputError: verdicts are missing, or something was changed.
     """
-    source, lines, outcomes = _scored(check, unfinished=unfinished)
-    return _write([source], lines, outcomes, _report_folder(check))
+    methods = check.manifest.methods
+    source, lines, outcomes = _scored(check, methods, unfinished=unfinished)
+    return _write([source], methods, lines, outcomes, _report_folder(check))
 
 
 def score_together(checks: Sequence[BlindCheck], folder: Path) -> Path:
     """Write one report of several checks, whose answers are unsealed; return it.
 
     A thousand cases take longer than one machine may have: each check has its own seed, key and
-    version, and the report names them all.
+    version, and the report names them all. It has the methods that all of them compare: those of
+    others are slow, so that some checks are of this diagnosis alone.
 
     Args:
-        checks: of the same methods.
+        checks: of one method at least that all of them compare.
         folder: where the report goes.
 
     Raises:
-        InputError: a check is still sealed, two are the same or have other methods, or something
-            was changed.
+        InputError: a check is still sealed, two are the same or share no method, or something was
+            changed.
     """
-    methods = checks[0].manifest.methods
+    compared = [check.manifest.methods for check in checks]
+    shared = tuple(method for method in compared[0] if all(method in each for each in compared))
     if len({check.manifest.check for check in checks}) < len(checks):
         raise InputError("The folders hold the same check twice; name each check once.")
     for check in checks:
@@ -55,27 +58,27 @@ def score_together(checks: Sequence[BlindCheck], folder: Path) -> Path:
                 f"{check.folder} is still sealed; end it first with "
                 f"`fjr blind score {check.folder}`."
             )
-        if check.manifest.methods != methods:
-            raise InputError(
-                f"{check.folder} compares {', '.join(check.manifest.methods)}, and "
-                f"{checks[0].folder} {', '.join(methods)}; score together what compares the same."
-            )
+    if not shared:
+        each = " and ".join(f"{c.folder} {', '.join(c.manifest.methods)}" for c in checks)
+        raise InputError(f"No method is compared in all of these checks: {each}.")
     sources, lines, outcomes = [], [], []
     for check in checks:
-        source, own, found = _scored(check)
+        source, own, found = _scored(check, shared)
         sources.append(source)
         lines += [{**line, "case": f"{source.seed} {line['case']}"} for line in own]
         outcomes += [replace(one, case=f"{source.seed} {one.case}") for one in found]
     folder.mkdir(parents=True, exist_ok=True)
-    return _write(sources, lines, outcomes, folder)
+    return _write(sources, shared, lines, outcomes, folder)
 
 
 def _scored(
-    check: BlindCheck, *, unfinished: bool = False
+    check: BlindCheck, methods: Sequence[str], *, unfinished: bool = False
 ) -> tuple[Source, list[dict[str, Any]], list[Outcome]]:
-    """Return where the outcomes of a check come from, its raw verdicts and these outcomes."""
+    """Return where the outcomes of methods come from, their raw verdicts and these outcomes."""
     answers = dict(check.unseal(unfinished=unfinished))
-    lines = [line for line in check.verdicts() if line["case"] in answers]
+    lines = [
+        line for line in check.verdicts() if line["case"] in answers and line["method"] in methods
+    ]
     outcomes = [Outcome.of(answers[line["case"]], line) for line in lines]
     opened = Unsealed.read(check.folder / "unsealed.json")
     seen = len({line["case"] for line in lines})
@@ -111,7 +114,7 @@ def rehearse_report(check: BlindCheck) -> None:
     try:
         with TemporaryDirectory(prefix=".rehearsal-", dir=folder) as place:
             source = Source("a rehearsal", check.manifest, len(check.cases), len(check.cases))
-            _write([source], [], outcomes, Path(place))
+            _write([source], check.manifest.methods, [], outcomes, Path(place))
     except OSError as error:
         raise InputError(
             f"{folder}, where the report will go, cannot be written: {error.strerror}; make room "
@@ -133,12 +136,12 @@ def _report_folder(check: BlindCheck) -> Path:
 
 def _write(
     sources: Sequence[Source],
+    methods: Sequence[str],
     lines: Sequence[Mapping[str, Any]],
     outcomes: Sequence[Outcome],
     folder: Path,
 ) -> Path:
     """Write scores, figures and text into a folder; return the text's path."""
-    methods = sources[0].manifest.methods
     found = all_scores(outcomes, methods, frozen_digest())
     write_whole(folder / "scores.json", found.to_json())
     ours = [o for o in outcomes if o.method == methods[0]]

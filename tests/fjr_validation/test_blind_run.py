@@ -7,6 +7,7 @@ import stat
 import subprocess
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -43,7 +44,7 @@ def begun(tmp_path: Path, cases: dict[str, int] | None = None) -> BlindCheck:
     return BlindCheck.begin(tmp_path / "blind", cases or CASES, SEED, ["refit"])
 
 
-def fill(check: BlindCheck, names: list[str]) -> None:
+def fill(check: BlindCheck, names: list[str], methods: Sequence[str] = ("refit",)) -> None:
     """Write sealed answers and verdicts of cases as a run would, without any simulation."""
     key = Secret.load(check.manifest.check).key
     truth = {
@@ -55,8 +56,9 @@ def fill(check: BlindCheck, names: list[str]) -> None:
         answer = {**truth, "world": name.split("_")[0]}
         JsonLines(check.folder / "sealed.jsonl").append(sealed_line(name, answer, key))
         diagnosis = {"verdict": "parameters_only", "effects": [], "confidence": 0.9}
-        line = {"case": name, "method": "refit", "seconds": 1.0, "diagnosis": diagnosis}
-        JsonLines(check.folder / "verdicts.jsonl").append(line)
+        line = {"case": name, "seconds": 1.0, "diagnosis": diagnosis}
+        lines = [{**line, "method": method} for method in methods]
+        JsonLines(check.folder / "verdicts.jsonl").append(*lines)
 
 
 def test_lines_survive_a_kill_in_the_middle_of_one(tmp_path):
@@ -160,6 +162,21 @@ def test_several_checks_make_one_report(state, tmp_path):
     assert scores.methods["refit"]["closed"]["nothing_named"].cases == 3
     with pytest.raises(InputError, match="the same check twice"):
         score_together([checks[0], checks[0]], tmp_path / "both")
+
+
+def test_checks_of_other_methods_are_scored_by_those_that_they_share(state, tmp_path):
+    orders = {205: ["refit", "bic"], 206: ["fjr", "refit"], 207: ["sparse"]}
+    for seed, methods in orders.items():
+        check = BlindCheck.begin(tmp_path / str(seed), CASES, seed, methods)
+        fill(check, ["closed_0000"], methods)
+        score_check(check, unfinished=True)
+    checks = {seed: BlindCheck.open(tmp_path / str(seed)) for seed in orders}
+    score_together([checks[205], checks[206]], tmp_path / "both")
+    scores = Scores.read(tmp_path / "both" / "scores.json")
+    assert list(scores.methods) == ["refit"]
+    assert scores.methods["refit"]["closed"]["nothing_named"].cases == 2
+    with pytest.raises(InputError, match=r"No method is .*205 refit, bic and .*207 sparse\."):
+        score_together([checks[205], checks[207]], tmp_path / "none")
 
 
 def test_a_changed_verdict_is_found(state, tmp_path):
