@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fjr_records.periodic import RecordedExperiment
 from fjr_sim_node import effects as fx
 
 _QUARTER_CYCLE = 0.2  # rad of rms motion: about a quarter of what is then travelled to and fro
@@ -89,19 +88,6 @@ class Scales:
                     [u[span // 2 :][: v.size] for u, v in zip(torques, speeds, strict=True)]
                 ),
             ),
-        )
-
-    @classmethod
-    def of_experiment(cls, recorded: RecordedExperiment, nominal: Mapping[str, float]) -> Scales:
-        """Return the scales of a periodic experiment; its lines end where the signal does."""
-        description = recorded.experiment
-        rate = description.sample_rate_hz
-        return cls.of_record(
-            [r.position.ravel() for r in recorded.realizations],
-            [r.torque.ravel() for r in recorded.realizations],
-            rate,
-            (recorded.lines - 1) * rate / description.samples_per_period,
-            nominal,
         )
 
     def of(self, name: str) -> float:
