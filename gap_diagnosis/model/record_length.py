@@ -12,7 +12,9 @@ from .steady_runs import SteadyRuns
 LEAST_SAMPLES = 64
 """Of each record: eight of the shortest windows."""
 LONGEST_S = 300.0
-"""Of all records together, what is played at the most (s)."""
+MOST_SAMPLES = 30_000
+"""Of all records together, what is played at the most: so many seconds, or so many samples where
+that is longer, as of a slow plant that is sampled slowly."""
 
 
 def within(records: RecordSet) -> tuple[RecordSet, list[str]]:
@@ -26,13 +28,14 @@ def within(records: RecordSet) -> tuple[RecordSet, list[str]]:
     if isinstance(records, SteadyRuns):  # they were chosen by their length
         return records, []
     total = sum(r.samples for r in records.records) / records.sample_rate_hz
-    if total <= LONGEST_S:
+    longest = max(LONGEST_S, MOST_SAMPLES / records.sample_rate_hz)
+    if total <= longest:
         return records, []
-    share = LONGEST_S / total
+    share = longest / total
     kept = [_first(record, max(int(share * record.samples), 1)) for record in records.records]
     note = (
         f"The records last {total:.0f} s; the first {100 * share:.0f} % of each are used, "
-        f"{LONGEST_S:.0f} s in all."
+        f"{longest:.0f} s in all."
     )
     return replace(records, records=tuple(kept)), [note]
 
