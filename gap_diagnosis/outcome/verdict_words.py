@@ -195,7 +195,8 @@ def headline(diagnosis: Diagnosis) -> str:
     if not diagnosis.effects:
         return words
     if diagnosis.verdict == "ambiguous":
-        return f"An effect is missing: {_sets(diagnosis)}"
+        one = len(diagnosis.equivalent) == 1
+        return f"{'An effect is' if one else 'Effects are'} missing: {_sets(diagnosis)}"
     if diagnosis.verdict == "partly_explained":
         return f"Missing: {_sets(diagnosis)}; a remainder stays"
     return f"Missing: {explanation(diagnosis.effects)}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from gap_diagnosis.outcome.diagnosis import Diagnosis, Gap, Gaps, NextExperiment
-from gap_diagnosis.outcome.verdict_words import OUT_OF_TIME, action, is_better, meaning
+from gap_diagnosis.outcome.verdict_words import OUT_OF_TIME, action, headline, is_better, meaning
 
 
 def gap(chi2):
@@ -53,3 +53,12 @@ def test_updated_parameters_are_advised_only_where_they_come_nearer(verdict):
 def test_a_nominal_that_diverges_is_worse_than_any_fit():
     gaps = said("unexplained").gap.model_copy(update={"nominal": None})
     assert is_better(said("unexplained").model_copy(update={"gap": gaps}))
+
+
+def test_the_headline_counts_causes_and_not_the_members_of_a_set():
+    one = said("ambiguous", effects=("backlash",)).model_copy(
+        update={"equivalent": [["backlash", "piecewise_stiffness"]]}
+    )
+    assert headline(one) == "An effect is missing: backlash or piecewise stiffness"
+    two = one.model_copy(update={"equivalent": [*one.equivalent, ["gravity"]]})
+    assert headline(two) == "Effects are missing: backlash or piecewise stiffness; gravity"
