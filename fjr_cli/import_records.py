@@ -17,7 +17,7 @@ def import_records(
         list[Path],
         typer.Argument(
             metavar="FILE...",
-            help="MAT, CSV, text, NPZ or JSON files, one run each, level by level; text and JSON "
+            help="MAT, CSV, text, NumPy, HDF5 or JSON files, one run each, level by level; text and JSON "
             "may be packed (.gz).",
         ),
     ],

@@ -12,24 +12,29 @@ import numpy as np
 from fjr_interface.bags.audit import LARGEST
 from fjr_kit.errors import InputError
 
-from . import json_log, mat, npz, text
+from . import hdf5, json_log, mat, numpy_file, text
 from .source import Heading, Names, refuse_bomb, sample_axis
 
 Result = TypeVar("Result")
 
 READERS: dict[str, Callable[[Path], Names]] = {
     ".mat": mat.open_mat,
-    ".npz": npz.open_npz,
+    ".h5": hdf5.open_hdf5,
+    ".hdf5": hdf5.open_hdf5,
+    ".npz": numpy_file.open_npz,
+    ".npy": numpy_file.open_npy,
     ".csv": text.open_text,
     ".tsv": text.open_text,
     ".txt": text.open_text,
     ".dat": text.open_text,
+    ".asc": text.open_text,
+    ".log": text.open_text,
     ".json": json_log.open_json,
     ".jsonl": json_log.open_json,
     ".ndjson": json_log.open_json,
 }
 """What reads a file, by its suffix; each may be followed by .gz where it holds text."""
-_TEXTS = tuple(suffix for suffix in READERS if suffix not in (".mat", ".npz"))
+_TEXTS = tuple(s for s, read in READERS.items() if read in (text.open_text, json_log.open_json))
 
 
 def read_columns(

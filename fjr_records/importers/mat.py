@@ -1,4 +1,4 @@
-"""MATLAB files: version 5 (up to `-v7`) by SciPy, version 7.3 by h5py where that is installed."""
+"""MATLAB files: version 5 (up to `-v7`) by SciPy; version 7.3 is HDF5."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import numpy as np
 
 from fjr_kit.errors import InputError
 
+from .hdf5 import open_hdf5
 from .source import EXPANSION, LEAST_BYTES, Names, refuse_bomb
 
 _HEADER, _COMPRESSED = 128, 15
@@ -22,7 +23,7 @@ def open_mat(path: Path) -> Names:
     """Open a `.mat` file; a field of a structure is named `structure.field`; raise InputError."""
     with path.open("rb") as file:
         if file.read(10) == b"MATLAB 7.3":
-            return _open_hdf5(path)
+            return open_hdf5(path)
     from scipy.io import loadmat
 
     refuse_bomb(path, _unpacked_size(path))
@@ -34,41 +35,6 @@ def open_mat(path: Path) -> Names:
         raise InputError(f"{path}: is not a readable MAT file; save it again.") from None
     variables = _flatten(content)
     return Names(path, list(variables), variables.__getitem__)
-
-
-def _open_hdf5(path: Path) -> Names:
-    try:
-        import h5py
-    except ImportError:
-        raise InputError(
-            f"{path}: is a MATLAB 7.3 file; install fjr-rig[mat73], or write it with "
-            "save(..., '-v7')."
-        ) from None
-    shapes: dict[str, tuple[int, ...]] = {}
-
-    def note(name: str, item: Any) -> None:
-        hidden = name.startswith("#")  # where cells keep what they refer to
-        if isinstance(item, h5py.Dataset) and item.dtype.kind in "fiub" and not hidden:
-            shapes[name.replace("/", ".")] = item.shape
-
-    def find(name: str) -> np.ndarray:
-        refuse_bomb(path, 8 * int(np.prod(shapes[name])))
-        try:
-            with h5py.File(path) as file:
-                return np.asarray(file[name.replace(".", "/")]).T  # MATLAB counts columns first
-        except Exception:  # h5py parses arbitrary bytes here: anything may go wrong
-            raise _unreadable(path) from None
-
-    try:
-        with h5py.File(path) as file:
-            file.visititems(note)
-    except Exception:
-        raise _unreadable(path) from None
-    return Names(path, [name for name, shape in shapes.items() if np.prod(shape) > 1], find)
-
-
-def _unreadable(path: Path) -> InputError:
-    return InputError(f"{path}: is not a readable MATLAB 7.3 file; save it again.")
 
 
 def _unpacked_size(path: Path) -> int:

@@ -138,7 +138,7 @@ def test_mat_with_signals_in_rows(tmp_path):
 
 
 def test_mat_of_version_7_3(tmp_path):
-    h5py = pytest.importorskip("h5py", reason="h5py, of the extra mat73, is not installed")
+    h5py = pytest.importorskip("h5py", reason="h5py, of the extra hdf5, is not installed")
     with h5py.File(tmp_path / "rig.mat", "w", userblock_size=512) as file:
         file["rec/pos"] = np.stack([R, Y]).T  # MATLAB writes its rows as columns
         file["rec/t"] = T[:, None]
@@ -148,8 +148,41 @@ def test_mat_of_version_7_3(tmp_path):
     np.testing.assert_array_equal(list(found.values()), [Y, T])
     with (tmp_path / "rig.mat").open("r+b") as file:
         file.truncate(900)
-    with pytest.raises(InputError, match=r"is not a readable MATLAB 7\.3 file"):
+    with pytest.raises(InputError, match=r"is not a readable HDF5 file"):
         read_columns(tmp_path / "rig.mat", ["rec.t"])
+
+
+def test_hdf5_of_groups_and_tables(tmp_path):
+    h5py = pytest.importorskip("h5py", reason="h5py, of the extra hdf5, is not installed")
+    with h5py.File(tmp_path / "rig.h5", "w") as file:
+        file["run/signals"] = np.stack([R, Y])
+        file["run/t"] = T
+        rows = np.zeros(T.size, [("time", float), ("joint", "S4"), ("y", np.float32)])
+        rows["time"], rows["y"] = T, Y
+        file["table"] = rows
+    names = ["run.signals[1]", "run.t", "table.time"]
+    found = read_columns(tmp_path / "rig.h5", names)[0]
+    np.testing.assert_array_equal(list(found.values()), [Y, T, T])
+    held, more = held_columns(tmp_path / "rig.h5")
+    listed = {"run.signals", "run.t", "table.time", "table.y"}
+    assert {one.name for one in held} == listed and more == 0
+
+
+def test_a_single_numpy_array(tmp_path):
+    np.save(tmp_path / "rows.npy", np.stack([T, R, Y]))
+    np.save(tmp_path / "columns.npy", np.stack([T, R, Y], axis=1))
+    for name in ("rows.npy", "columns.npy"):
+        found = read_columns(tmp_path / name, ["2", "[1]"])[0]
+        np.testing.assert_array_equal(list(found.values()), [Y, R])
+        assert [one.name for one in held_columns(tmp_path / name)[0]] == ["0", "1", "2"]
+    fields = np.rec.fromarrays([T, Y], names="t,y")
+    np.save(tmp_path / "fields.npy", fields)
+    np.testing.assert_array_equal(read_columns(tmp_path / "fields.npy", ["y"])[0]["y"], Y)
+    np.save(tmp_path / "one.npy", Y)
+    np.testing.assert_array_equal(read_columns(tmp_path / "one.npy", ["0"])[0]["0"], Y)
+    np.save(tmp_path / "cube.npy", np.zeros((3, 4, 5)))
+    with pytest.raises(InputError, match="there is no 0; the file holds nothing"):
+        read_columns(tmp_path / "cube.npy", ["0"])
 
 
 BROKEN = [
@@ -163,6 +196,8 @@ BROKEN = [
     ("a.csv", "r,y\n1\n2\n", "line 2 has 1 columns, not 2"),
     ("a.csv", "a\0b", "is not a text file"),
     ("a.csv.gz", "r,y\n1,2\n", "is not a whole gzip file"),
+    ("a.npy", "r,y\n1,2\n", "is not a NPY array of numbers"),
+    ("a.h5", "r,y\n1,2\n", "HDF5|h5py"),
     ("a.json", "", "is not JSON"),
     ("a.json", '{"r": [1, 2', "is not JSON"),
     ("a.json", '{"r": [], "y": []}', "there is no r; the file holds nothing"),
@@ -209,6 +244,8 @@ def _whole(suffix: str, folder) -> bytes:
         savemat(file, {"r": R, "y": Y, "s": {"m": np.stack([R, Y])}}, do_compression=True)
     elif suffix == ".npz":
         np.savez_compressed(file, r=R, y=Y)
+    elif suffix == ".npy":
+        np.save(file, np.rec.fromarrays([R, Y], names="r,y"))
     elif suffix in (".json", ".jsonl", ".ndjson"):
         file.write_text(json.dumps([{"r": r, "y": y} for _, r, y in ROWS]))
     else:
