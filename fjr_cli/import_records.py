@@ -17,8 +17,8 @@ def import_records(
         list[Path],
         typer.Argument(
             metavar="FILE...",
-            help="MAT, CSV, text, NumPy, HDF5 or JSON files, one run each, level by level; text and JSON "
-            "may be packed (.gz).",
+            help="MAT, CSV, text, NumPy, HDF5 or JSON files, one run each, level by level; text "
+            "and JSON may be packed (.gz).",
         ),
     ],
     column_map: Annotated[
