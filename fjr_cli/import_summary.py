@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import numpy as np
 from fjr_interface.experiment import Experiment, RecordDescription
 from fjr_records.importers.columns import held_columns
 from fjr_records.importers.importer import Understood
+from fjr_records.importers.likely_columns import likely_map
 from fjr_records.importers.record_file import SYMBOLS, Record
 from fjr_records.importers.repetition import Repetition
 
@@ -30,9 +32,16 @@ def held_by(path: Path) -> Iterator[str]:
         yield f"  {one.name:<{width}}  {shape:>10}  {values}"
     if more:
         yield f"  and {more} more, not shown"
+    likely = likely_map([one.name for one in columns if one.range and max(one.shape) > 1])
+    specs = [
+        f"{quantity}={likely.get(quantity, 'COLUMN:UNIT')}"
+        for quantity in ("torque", "position", "reference", "time")
+        if quantity in likely or quantity != "reference"
+    ]
+    guess = " (as the names suggest)" if likely else ""
     yield (
         "Nothing was written. Next: name the columns of torque and position, perhaps of reference "
-        "and time: --dry-run --map torque=COLUMN:UNIT,position=COLUMN:UNIT,time=COLUMN:s"
+        f"and time{guess}: --dry-run --map {shlex.quote(','.join(specs))}"
     )
 
 

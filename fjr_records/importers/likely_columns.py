@@ -1,0 +1,59 @@
+"""Which columns of a file are likely time, reference, torque and position, by their names."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from .import_map import UNITS
+from .stated_units import stated_unit
+
+_TIME = {"t", "time", "timestamp", "stamp", "zeit"}
+_ASKED = {
+    "r", "ref", "reference", "cmd", "command", "commanded", "des", "desired", "goal", "target",
+    "set", "setpoint", "soll",
+}  # fmt: skip
+_TORQUE = {
+    "tau", "torque", "trq", "u", "i", "iq", "current", "effort", "load", "force", "moment",
+    "voltage", "pwm",
+}  # fmt: skip
+_ANGLE = {"pos", "position", "angle", "theta"}
+_MOTION = _ANGLE | {"q", "y", "enc", "encoder", "act", "actual", "meas", "measured", "ist"}
+_OTHER = {"vel", "velocity", "speed", "acc", "acceleration", "dq", "ddq", "qd", "qdd", "temp"}
+_WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
+
+
+def likely_map(names: Sequence[str]) -> dict[str, str]:
+    """Return {quantity: `column` or `column:FACTOR`} where just one column's name suggests it.
+
+    Args:
+        names: of the columns, in the file's order. A name that cannot stand in a map is no column.
+    """
+    found: dict[str, list[str]] = {"time": [], "reference": [], "torque": [], "position": []}
+    for name in names:
+        quantity = _quantity(name)
+        if quantity is not None and not set(",:=") & set(name):
+            found[quantity].append(name)
+    return {
+        quantity: f"{each[0]}{_factor(quantity, each[0])}"
+        for quantity, each in found.items()
+        if len(each) == 1
+    }
+
+
+def _quantity(name: str) -> str | None:
+    """Return what a name says that its column is: `goal_position` a reference; None for nothing."""
+    words = {word.lower() for word in _WORD.findall(re.sub(r"[\[({].*", "", name))}
+    if words & _OTHER:
+        return None
+    if words & _TIME:
+        return "time"
+    asked, torque = bool(words & _ASKED), bool(words & _TORQUE) and not words & _ANGLE
+    if asked or torque:
+        return None if asked and torque else "reference" if asked else "torque"
+    return "position" if words & _MOTION else None
+
+
+def _factor(quantity: str, name: str) -> str:
+    stated = stated_unit(name, "", UNITS[quantity])
+    return ":FACTOR" if stated and stated not in UNITS[quantity] else ""
