@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from fjr_interface.experiment import Experiment, RecordDescription
-from fjr_records.importers.columns import held_columns
+from fjr_records.importers.columns import Held, held_columns
 from fjr_records.importers.importer import Understood
 from fjr_records.importers.likely_columns import likely_map
-from fjr_records.importers.record_file import SYMBOLS, Record
+from fjr_records.importers.record_file import LEAST_SAMPLES, SYMBOLS, Record
 from fjr_records.importers.repetition import Repetition
 
 _UNITS = {"reference": "rad", "torque": "N m", "position": "rad", "link": "rad"}
@@ -32,7 +32,7 @@ def held_by(path: Path) -> Iterator[str]:
         yield f"  {one.name:<{width}}  {shape:>10}  {values}"
     if more:
         yield f"  and {more} more, not shown"
-    likely = likely_map([one.name for one in columns if one.range and max(one.shape) > 1])
+    likely = likely_map(_signals(columns))
     specs = [
         f"{quantity}={likely.get(quantity, 'COLUMN:UNIT')}"
         for quantity in ("torque", "position", "reference", "time")
@@ -43,6 +43,19 @@ def held_by(path: Path) -> Iterator[str]:
         "Nothing was written. Next: name the columns of torque and position, perhaps of reference "
         f"and time{guess}: --dry-run --map {shlex.quote(','.join(specs))}"
     )
+
+
+def _signals(columns: Sequence[Held]) -> list[str]:
+    """Return the names of the columns that vary, of the length that most records in it have."""
+    vary = [
+        one
+        for one in columns
+        if one.range and one.range[0] < one.range[1]
+        if LEAST_SAMPLES <= max(one.shape, default=0) == np.prod(one.shape)
+    ]
+    lengths = [max(one.shape) for one in vary]
+    usual = max(lengths, key=lengths.count, default=0)
+    return [one.name for one, length in zip(vary, lengths, strict=True) if length == usual]
 
 
 def summary(understood: Understood) -> Iterator[str]:

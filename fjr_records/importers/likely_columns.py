@@ -19,7 +19,10 @@ _TORQUE = {
 }  # fmt: skip
 _ANGLE = {"pos", "position", "angle", "theta"}
 _MOTION = _ANGLE | {"q", "y", "enc", "encoder", "act", "actual", "meas", "measured", "ist"}
-_OTHER = {"vel", "velocity", "speed", "acc", "acceleration", "dq", "ddq", "qd", "qdd", "temp"}
+_OTHER = {
+    "vel", "velocity", "speed", "acc", "acceleration", "dq", "ddq", "qd", "qdd", "temp", "error",
+    "err", "enable", "enabled", "init", "supply", "status",
+}  # fmt: skip
 _WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
 
 
@@ -43,7 +46,8 @@ def likely_map(names: Sequence[str]) -> dict[str, str]:
 
 def _quantity(name: str) -> str | None:
     """Return what a name says that its column is: `goal_position` a reference; None for nothing."""
-    words = {word.lower() for word in _WORD.findall(re.sub(r"[\[({].*", "", name))}
+    found = _WORD.findall(re.sub(r"[\[({].*", "", name.rpartition(".")[2]))
+    words = {word.lower() for at, word in enumerate(found) if at == 0 or len(word) > 1}
     if words & _OTHER:
         return None
     if words & _TIME:

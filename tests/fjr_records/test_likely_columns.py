@@ -22,6 +22,7 @@ from fjr_records.importers.likely_columns import likely_map
         ),
         (["MotorAngle", "MotorTorque"], "torque=MotorTorque position=MotorAngle"),
         (["load_angle", "torque_ref"], "position=load_angle"),
+        (["para.k_T", "run.t", "y_T"], "time=run.t position=y_T"),
         (["q1", "q2", "tau1", "tau2"], ""),
         (["a,b", "0", "1", "torque:x"], ""),
     ],
