@@ -46,7 +46,7 @@ def held_by(path: Path) -> Iterator[str]:
 
 
 def _signals(columns: Sequence[Held]) -> list[str]:
-    """Return the names of the columns that vary, of the length that most records in it have."""
+    """Return the names of the columns that vary, of the length that most of them have."""
     vary = [
         one
         for one in columns
