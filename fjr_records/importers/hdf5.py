@@ -12,17 +12,21 @@ from fjr_kit.errors import InputError
 from .source import Names, refuse_bomb
 
 
-def open_hdf5(path: Path) -> Names:
+def open_hdf5(path: Path, kind: str = "HDF5") -> Names:
     """Open a `.h5` file; `group/signal` is named `group.signal`; raise InputError.
 
     A field of a table is named like a signal in a group of the table's name.
+
+    Args:
+        path: the file.
+        kind: what it is called.
     """
     try:
         import h5py
     except ImportError:
         raise InputError(
-            f"{path}: is read by h5py, not installed here; install fjr-rig[hdf5], or write the "
-            "signals as NPZ, CSV or MAT (save(..., '-v7'))."
+            f"{path}: is a {kind} file, read by h5py, not installed here; install fjr-rig[hdf5], "
+            "or write the signals as NPZ, CSV or MAT (save(..., '-v7'))."
         ) from None
     shapes: dict[str, tuple[int, ...]] = {}
     tables: dict[str, str] = {}
@@ -45,15 +49,15 @@ def open_hdf5(path: Path) -> Names:
                     return np.asarray(file[table.replace(".", "/")][name[len(table) + 1 :]])
                 return np.asarray(file[name.replace(".", "/")]).T  # MATLAB counts columns first
         except Exception:  # h5py parses arbitrary bytes here: anything may go wrong
-            raise _unreadable(path) from None
+            raise _unreadable(path, kind) from None
 
     try:
         with h5py.File(path) as file:
             file.visititems(note)
     except Exception:
-        raise _unreadable(path) from None
+        raise _unreadable(path, kind) from None
     return Names(path, [name for name, shape in shapes.items() if np.prod(shape) > 1], find)
 
 
-def _unreadable(path: Path) -> InputError:
-    return InputError(f"{path}: is not a readable HDF5 file; save it again.")
+def _unreadable(path: Path, kind: str) -> InputError:
+    return InputError(f"{path}: is not a readable {kind} file; save it again.")

@@ -23,7 +23,7 @@ def open_mat(path: Path) -> Names:
     """Open a `.mat` file; a field of a structure is named `structure.field`; raise InputError."""
     with path.open("rb") as file:
         if file.read(10) == b"MATLAB 7.3":
-            return open_hdf5(path)
+            return open_hdf5(path, "MATLAB 7.3")
     from scipy.io import loadmat
 
     refuse_bomb(path, _unpacked_size(path))

@@ -148,7 +148,7 @@ def test_mat_of_version_7_3(tmp_path):
     np.testing.assert_array_equal(list(found.values()), [Y, T])
     with (tmp_path / "rig.mat").open("r+b") as file:
         file.truncate(900)
-    with pytest.raises(InputError, match=r"is not a readable HDF5 file"):
+    with pytest.raises(InputError, match=r"is not a readable MATLAB 7\.3 file"):
         read_columns(tmp_path / "rig.mat", ["rec.t"])
 
 
