@@ -19,10 +19,7 @@ Result = TypeVar("Result")
 
 READERS: dict[str, Callable[[Path], Names]] = {
     ".mat": mat.open_mat,
-    ".h5": hdf5.open_hdf5,
-    ".hdf5": hdf5.open_hdf5,
     ".npz": numpy_file.open_npz,
-    ".npy": numpy_file.open_npy,
     ".csv": text.open_text,
     ".tsv": text.open_text,
     ".txt": text.open_text,
@@ -32,6 +29,9 @@ READERS: dict[str, Callable[[Path], Names]] = {
     ".json": json_log.open_json,
     ".jsonl": json_log.open_json,
     ".ndjson": json_log.open_json,
+    ".npy": numpy_file.open_npy,
+    ".h5": hdf5.open_hdf5,
+    ".hdf5": hdf5.open_hdf5,
 }
 """What reads a file, by its suffix; each may be followed by .gz where it holds text."""
 _TEXTS = tuple(s for s, read in READERS.items() if read in (text.open_text, json_log.open_json))
