@@ -105,7 +105,7 @@ def read_joint(path: Path | str, without: Collection[str] = ()) -> Joint:
             f"{path}: /rig/simulator is missing; give the updated.yaml of a diagnosis, or write "
             "the joint's values below it."
         )
-    effects.demand(without)
+    effects.check_identifiers(without)
     values = SIMULATOR.check(given, f"{path}: /rig/simulator")
     if math.isinf(values["j"]):
         raise InputError(

@@ -28,26 +28,26 @@ def open_hdf5(path: Path, kind: str = "HDF5") -> Names:
             f"{path}: is a {kind} file, read by h5py, not installed here; install fjr-rig[hdf5], "
             "or write the signals as NPZ, CSV or MAT (save(..., '-v7'))."
         ) from None
-    shapes: dict[str, tuple[int, ...]] = {}
-    tables: dict[str, str] = {}
+    held: dict[str, tuple[tuple[int, ...], str, str | None]] = {}
 
-    def note(name: str, item: Any) -> None:
-        if not isinstance(item, h5py.Dataset) or name.startswith("#"):  # what MATLAB's cells hold
+    def note(path_inside: str, item: Any) -> None:
+        if not isinstance(item, h5py.Dataset) or path_inside.startswith("#"):  # MATLAB's cells
             return
-        dotted = name.replace("/", ".")
-        for field, (kind, _) in (item.dtype.fields or {}).items():
-            if kind.kind in "fiub":
-                shapes[f"{dotted}.{field}"], tables[f"{dotted}.{field}"] = item.shape, dotted
+        name = path_inside.replace("/", ".")
         if item.dtype.kind in "fiub":
-            shapes[dotted] = item.shape
+            held[name] = item.shape, path_inside, None
+        for field, (dtype, _) in (item.dtype.fields or {}).items():
+            if dtype.kind in "fiub":
+                held[f"{name}.{field}"] = item.shape, path_inside, field
 
     def find(name: str) -> np.ndarray:
-        refuse_bomb(path, 8 * int(np.prod(shapes[name])))
+        shape, path_inside, field = held[name]
+        refuse_bomb(path, 8 * int(np.prod(shape)))
         try:
             with h5py.File(path) as file:
-                if (table := tables.get(name)) is not None:
-                    return np.asarray(file[table.replace(".", "/")][name[len(table) + 1 :]])
-                return np.asarray(file[name.replace(".", "/")]).T  # MATLAB counts columns first
+                stored = file[path_inside]
+                array = np.asarray(stored if field is None else stored[field])
+                return array.T  # MATLAB counts columns first
         except Exception:  # h5py parses arbitrary bytes here: anything may go wrong
             raise _unreadable(path, kind) from None
 
@@ -56,7 +56,7 @@ def open_hdf5(path: Path, kind: str = "HDF5") -> Names:
             file.visititems(note)
     except Exception:
         raise _unreadable(path, kind) from None
-    return Names(path, [name for name, shape in shapes.items() if np.prod(shape) > 1], find)
+    return Names(path, [name for name, (shape, *_) in held.items() if np.prod(shape) > 1], find)
 
 
 def _unreadable(path: Path, kind: str) -> InputError:

@@ -37,9 +37,9 @@ __all__ = [
     "PARAMETERS",
     "Effect",
     "EffectParameter",
+    "check_identifiers",
     "coefficients",
     "contains",
-    "demand",
     "holders",
     "near_equivalents",
     "parameter",
@@ -81,7 +81,7 @@ def __getattr__(name: str) -> int:
         raise AttributeError(f"the table of effects has no parameter {name}") from None
 
 
-def demand(identifiers: Iterable[str]) -> None:
+def check_identifiers(identifiers: Iterable[str]) -> None:
     """Raise InputError where an identifier is that of no effect, with the nearest ones."""
     for name in identifiers:
         if name not in EFFECTS:

@@ -23,7 +23,7 @@ def catalogue(nominal: Mapping[str, float], asked: Sequence[str] | None = None) 
     Raises:
         InputError: an identifier of no effect, or none that this rig can have.
     """
-    fx.demand(asked or ())
+    fx.check_identifiers(asked or ())
     found = [
         name
         for name in possible_effects(nominal)
