@@ -139,7 +139,7 @@ def investigate(
             break
         progress(f"once more, for a datasheet that {supposed}")
         other = look(times * tolerance, left)
-        if further_looks.says_more(other.diagnosis, found.diagnosis, bare):
+        if further_looks.says_more(other, found, bare, times):
             said = further_looks.said(other.diagnosis, bare, tolerance, times)
             notes = [said, *other.diagnosis.notes]
             found = replace(other, diagnosis=other.diagnosis.model_copy(update={"notes": notes}))

@@ -32,9 +32,9 @@ def called_for(found: Investigation) -> dict[float, str]:
     """
     if found.fitted is None:
         return {}
-    evidence, best = found.fitted.evidence, found.fitted.found.best
+    evidence = found.fitted.evidence
     driven = not evidence.slow and None in evidence.player.loop.laws
-    ended = bool(at_limits(best.space, best.solution.x, best.model.plant))
+    ended = _ended(found)
     looks = {}
     if ended or _GAIN in found.diagnosis.effects:
         looks[WIDER] = "is further off"
@@ -43,13 +43,27 @@ def called_for(found: Investigation) -> dict[float, str]:
     return looks
 
 
-def says_more(second: Diagnosis, first: Diagnosis, nominal: Mapping[str, float]) -> bool:
+def says_more(
+    other: Investigation, found: Investigation, nominal: Mapping[str, float], times: float
+) -> bool:
     """Tell whether a further look explains more, or as much by fewer effects.
 
-    All parameters off by one factor are a gain, and no better than one that is named.
+    All parameters off by one factor are a gain, and no better than one that is named. Nor is a
+    datasheet that is taken for further off and still ends at a limit, or needs more causes besides:
+    then its parameters stand for what no effect explains.
+
+    Args:
+        other: of the further look.
+        found: of the first one.
+        nominal: bare parameters of the datasheet.
+        times: how many tolerances the further look took for one.
     """
+    second, first = other.diagnosis, found.diagnosis
     left = [_left(diagnosis) for diagnosis in (second, first)]
     if _GAIN in first.effects and _one_factor(second, nominal):
+        return False
+    more_causes = 0 < len(first.effects) < len(second.effects)
+    if times > 1.0 and (more_causes or _ended(other)):
         return False
     if len(second.effects) < len(first.effects):
         return left[0] <= _ALIKE * left[1]
@@ -75,6 +89,14 @@ def said(second: Diagnosis, nominal: Mapping[str, float], tolerance: float, time
         f"effects are needed; so it was taken for further off{told}. Check its units, and the "
         "factor of the torque."
     )
+
+
+def _ended(found: Investigation) -> bool:
+    """Tell whether an inertia or the stiffness lies as far from the datasheet as fits may go."""
+    if found.fitted is None:
+        return False
+    best = found.fitted.found.best
+    return bool(at_limits(best.space, best.solution.x, best.model.plant))
 
 
 def _left(diagnosis: Diagnosis) -> float:

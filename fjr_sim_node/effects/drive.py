@@ -99,8 +99,9 @@ DRIVE: tuple[Effect, ...] = (
         "highest amplitude only, phase there",
         "rate limiter; limited current rise at the supply's voltage",
         (EffectParameter("limit_nm_s", math.inf, "N m/s", "Greatest rate; .inf: no limit", 1e-3,
-                         role="limit", fit=(1e-3, 4.0)),),
-        ({"limit_nm_s": (0.02, 0.04, 0.07, 0.1, 0.15, 0.2, 0.3, 0.4, 0.55, 0.7, 0.9)},),
+                         role="limit", fit=(1e-4, 4.0)),),
+        ({"limit_nm_s": (0.002, 0.004, 0.008, 0.02, 0.04, 0.07, 0.1, 0.15, 0.2, 0.3, 0.4, 0.55,
+                         0.7, 0.9)},),
     ),
     Effect(
         "dead_band",

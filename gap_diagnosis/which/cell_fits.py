@@ -177,6 +177,10 @@ class CellFitter(Comparison):
                 best = fit
         return None if best is None else replace(best, acts=self.acted(best, effect))
 
+    def promises(self, parent: CellFit, proposals: Sequence[Proposal]) -> bool:
+        """Tell whether a start beside a fit gains enough to be pursued."""
+        return any(cost <= self.begun(parent) - _LEAST_PROMISE for cost, *_ in proposals[:1])
+
     def begun(self, parent: CellFit) -> float:
         """Return what a fit costs itself, as its proposals do."""
         return float(self.weights.costs(parent.variance, parent.solution.residuals[None])[0])

@@ -11,7 +11,7 @@ from fjr_sim_node import effects as fx
 from .cell_fits import CellFitter
 from .comparison import NOTHING_LEFT, CellFit
 from .equivalents import ONE_CAUSE, founded, holders, partners, plainness
-from .gains import NEARLY_ALL, Gain, gain, left_of, stands_for
+from .gains import NEARLY_ALL, Gain, closed, gain, left_of, stands_for
 from .harmonics import WORTH_A_HARMONIC, with_second_harmonic
 from .screening import Proposal, Screening
 
@@ -23,6 +23,9 @@ _AGAIN = 8  # effects that are screened beside a cause, and those that depend on
 _OUTDATED = 0.1  # of the squared error that is left: then what was screened before is too far
 _MOST = 0.5  # of the squared error: a fit that leaves more leaves most of it
 _MUCH_LESS = 0.3  # of the greatest gain: a cause that gains less waits for the next step
+_WORTH_RICHER = 0.2
+"""Of what is left in the band where it gains most: a ripple that closes less is none of two
+harmonics either, and its second one is not looked for, which costs more than all else."""
 _START_LESS = 0.2  # of the greatest gain of a start: an effect whose best one gains less waits
 
 Progress = Callable[[str], None]
@@ -61,9 +64,8 @@ class Extension:
         effects = founded(effects, parent.effects, nominal, names)
         screened = self.screened(parent, effects)
         later = bool(parent.effects)
-        hopeful = sorted(screened, key=lambda e: -screened[e].gain)[: _PROPOSED[later]]
-        proposals = {e: screened[e].proposals() for e in hopeful}
-        ordered = sorted((e for e in hopeful if proposals[e]), key=lambda e: proposals[e][0][0])
+        proposals = self._proposed(parent, screened, _PROPOSED[later])
+        ordered = sorted((e for e in proposals if proposals[e]), key=lambda e: proposals[e][0][0])
         chosen = self._worth_a_fit(parent, proposals, ordered[: _FITTED[later]])
         held = founded(holders(chosen[:2], names), parent.effects, nominal, names)
         alike = {*partners(chosen[:2], set(effects)), *held}
@@ -124,6 +126,21 @@ class Extension:
     def gain(self, after: CellFit, before: CellFit) -> Gain:
         """Return what one fit gains over another on unseen parts."""
         return gain(self._fitter, after, before)
+
+    def _proposed(
+        self, parent: CellFit, screened: Mapping[str, Screening], most: int
+    ) -> dict[str, list[Proposal]]:
+        """Return starts of those that are screened best, so many at a time until one promises.
+
+        Of friction that is small the linear prediction, by which they are ordered, says little.
+        """
+        ordered = sorted(screened, key=lambda e: -screened[e].gain)
+        proposals: dict[str, list[Proposal]] = {}
+        for first in range(0, len(ordered), most):
+            proposals |= {e: screened[e].proposals() for e in ordered[first : first + most]}
+            if any(self._fitter.promises(parent, found) for found in proposals.values()):
+                break
+        return proposals
 
     def _worth_a_fit(
         self, parent: CellFit, proposals: Mapping[str, list[Proposal]], ordered: list[str]
@@ -187,7 +204,8 @@ class Extension:
         effect = fit.effects[-1]
         if not fx.EFFECTS[effect].ripple or self._fitter.misfit(fit) < WORTH_A_HARMONIC:
             return fit
-        if not self.gain(fit, parent).present:
+        repeats = self.gain(fit, parent).present
+        if not repeats or closed(self._fitter, fit, parent) < _WORTH_RICHER:
             return fit
         self._progress(f"{' + '.join(fit.effects)}, second harmonic")
         richer = with_second_harmonic(self._fitter, fit, parent)

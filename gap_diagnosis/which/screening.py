@@ -25,8 +25,8 @@ _SIZES = (0.1, 0.3, 3.0)  # of the size that the linear prediction asks for, tri
 _TRIED = 4
 _SCALED = 2
 LARGEST, LARGEST_OF_TORQUES = 30.0, 1000.0
-"""Times a seed: the largest size that is tried; the same where torques along a motion are compared,
-in which the size of most effects is linear."""
+"""Times a seed: the largest size that is tried, also where a larger one is asked for; the same where
+torques along a motion are compared, in which the size of most effects is linear."""
 _FOLLOW = 0.1  # how far a parameter of the parent may follow, relative
 
 _Base = Literal["following", "kept", "datasheet"]
@@ -145,7 +145,8 @@ class _Tries:
 
     def run(self, tries: Sequence[tuple[_Candidate, float]], base: _Base = "following") -> None:
         """Evaluate candidates at sizes, with base parameters of some kind."""
-        tries = [(c, size) for c, size in tries if 1e-3 < abs(size) < self._largest]
+        most = self._largest
+        tries = [(c, float(np.clip(size, -most, most))) for c, size in tries if abs(size) > 1e-3]
         if not tries:
             return
         points = [self._point(candidate, size, base) for candidate, size in tries]

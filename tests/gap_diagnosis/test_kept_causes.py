@@ -18,6 +18,7 @@ from gap_diagnosis.verdict.kept_causes import (
     _guesses,
     _kin,
     _one_by_one,
+    _twice,
     kept,
 )
 from gap_diagnosis.verdict.tested_causes import LEAST_PRESENT, causes_with_tests
@@ -166,3 +167,30 @@ def test_the_nearest_kin_of_what_no_effect_explains_is_told_in_a_note(searched):
     assert "60% of what the refit left" in said and "nearest kin" in said
     assert not replace(doubted, certain=False).nearest_kin
     assert not replace(doubted, left=0.1).nearest_kin
+
+
+@pytest.mark.parametrize(
+    ("share", "left", "factor"),
+    [(0.02, 0.02, 0.6), (0.02, 0.0, 1.0), (0.02, 0.02 / 0.85 - 0.02, 0.8), (0.1, 0.1, 1.0)],
+)
+def test_what_closes_little_and_leaves_as_much_may_be_what_another_law_leaves(
+    searched, share, left, factor
+):
+    fitter, fits = searched
+    sure = max(causes_with_tests(fitter, fits[3], fits[0], SCATTER), key=lambda t: t.present)
+    closes = replace(sure, in_band=0.9, left=left, over_noise=0.0)
+    little = sure.share.model_copy(update={"value": share, "low": 0.5 * share})
+    much = sure.share.model_copy(update={"value": 0.9, "low": 0.5 * share})
+    doubted, sure = replace(closes, share=little), replace(closes, share=much)
+    assert doubted.present == pytest.approx(factor * sure.present)
+
+
+def test_of_near_equivalents_the_one_that_closes_little_beside_the_other_names_it_twice(searched):
+    fitter, fits = searched
+    tested = causes_with_tests(fitter, fits[3], fits[0], SCATTER)
+    assert _twice(tested) == []
+    share = tested[0].share.model_copy(update={"value": 0.3})
+    delay, lag = (replace(tested[0], effect=e, share=share) for e in ("delay", "actuator_lag"))
+    little = replace(lag, share=replace_share(share))
+    assert _twice([delay, lag]) == []
+    assert _twice([delay, little]) == [little]

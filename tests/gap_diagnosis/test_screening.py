@@ -7,7 +7,7 @@ import numpy as np
 from fjr_sim_node.plant import PLANT
 from gap_diagnosis.model.rig_model import Model
 from gap_diagnosis.which.least_squares import Solution
-from gap_diagnosis.which.screening import Screening
+from gap_diagnosis.which.screening import LARGEST, Screening
 from gap_diagnosis.which.search_space import Space
 
 NOMINAL = PLANT.defaults()
@@ -46,3 +46,25 @@ def test_a_seed_that_explains_much_as_it_is_counts_though_no_linear_prediction_d
     assert np.isclose(cost, -cleared)
     assert space.model(point).effects == SEED
     assert np.isclose(screening.gain_beside(parent, np.ones(2 * HALF), costs), cleared)
+
+
+def test_a_size_beyond_the_largest_is_tried_at_the_largest():
+    size = "torque_bias.torque_nm"
+    tiny = 1e-3
+
+    def linear(models: list[Model]) -> np.ndarray:
+        sizes = np.array([model.effects.get(size, 0.0) for model in models])
+        return (1.0 - sizes)[:, None] * np.ones(2 * HALF)
+
+    def squares(rows: np.ndarray) -> np.ndarray:
+        return np.sum(rows**2, axis=1)
+
+    model = Model(NOMINAL, {})
+    base = len(NOMINAL)
+    parent = Solution(
+        np.zeros(base), 2.0 * HALF, np.zeros((2 * HALF, base)), linear([model])[0], True
+    )
+    space = Space(NOMINAL, (size,), (1.0,))
+    found = Screening(parent, model, [{size: tiny}], lambda _: space, linear, squares)
+    point = found.proposals()[0][2]
+    assert np.isclose(space.model(point).effects[size], LARGEST * tiny)
