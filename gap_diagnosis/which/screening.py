@@ -25,8 +25,8 @@ _SIZES = (0.1, 0.3, 3.0)  # of the size that the linear prediction asks for, tri
 _TRIED = 4
 _SCALED = 2
 LARGEST, LARGEST_OF_TORQUES = 30.0, 1000.0
-"""Times a seed: the largest size that is tried, also where a larger one is asked for; the same where
-torques along a motion are compared, in which the size of most effects is linear."""
+"""Times a seed: the largest size that is tried, also where a larger one is asked for; the same
+where torques along a motion are compared, in which the size of most effects is linear."""
 _FOLLOW = 0.1  # how far a parameter of the parent may follow, relative
 
 _Base = Literal["following", "kept", "datasheet"]
