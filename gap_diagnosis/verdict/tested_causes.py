@@ -12,7 +12,7 @@ from ..how_far.ledger import Ledger
 from ..outcome.diagnosis import Figure
 from ..which.cell_fits import CellFitter
 from ..which.comparison import CellFit
-from ..which.gains import Gain, closed, fall, gain
+from ..which.gains import Gain, beside_others, closed, fall, gain
 from ..which.presence import (
     LEAST_INVARIANCE_P,
     SAME_WORTH,
@@ -32,13 +32,17 @@ _UNCERTAIN = 0.5  # of what a cause whose size is not certain would be present
 _DOUBTED = 0.7  # over what remains: a cause that closes such a share is there as often as not
 _LITTLE = 0.2  # of what it closes and what is left: less is there less often than its band says
 _IF_NOTHING = 0.75  # of what a cause would be present, where all of that is left
-_OF_FORM = (0.03, 0.1)
+_SMALL = (0.03, 0.1)
 """Shares of the gap: a cause that closes less than the first may be what the form of another one's
 law leaves, one that closes more than the second is not..."""
 _LEAVES_LITTLE = (0.7, 0.8)
 """...unless what it closes is so much of what is left without it. Of the sure causes of the blind
 checks 319 to 329 that closed less than 0.03 of the gap and no more than 0.7 of what was left, 5
-were right and 6 wrong; of those that closed more of that, 9 were right and one wrong."""
+were right and 6 wrong; of those that closed more of that, 9 were right and one wrong..."""
+_OF_FORM = (0.1, 0.3)
+"""...or so much of what another cause does in its band: a law whose form is right to a third leaves
+a tenth of that. Of the wrong ones that were looked at anew three close 0.005, 0.02 and 0.15, one
+far more; a delay beside Coulomb friction, which is there, closes 0.45."""
 _IF_OF_FORM = 0.6  # of what such a cause would be present
 _MUCH_LEFT = (0.3, 0.5)
 """Shares of the refit's error, of the motion and over noise alike, between which what an
@@ -65,6 +69,7 @@ class Tested:
         over_noise: how much of what the refit leaves over noise, all errors counting by theirs, is
             left with it and all others; NaN where noise is not known.
         in_band: how much of what is left without it, it closes where it gains most; see `closed`.
+        beside_others: how much of what another cause does it closes there; see `beside_others`.
         ripples: how many of its ripples the motion passes; infinite for what has none.
     """
 
@@ -77,6 +82,7 @@ class Tested:
     share: Figure
     left: float
     in_band: float
+    beside_others: float = math.inf
     ripples: float = math.inf
     own_sizes: float = 0.0
     over_noise: float = math.nan
@@ -146,8 +152,9 @@ class Tested:
         sure *= _IF_NOTHING + (1.0 - _IF_NOTHING) * min(beside_left / _LITTLE, 1.0)
         sure *= self._beside_much
         beyond_form = max(
-            np.interp(share, _OF_FORM, (0.0, 1.0)),
+            np.interp(share, _SMALL, (0.0, 1.0)),
             np.interp(beside_left, _LEAVES_LITTLE, (0.0, 1.0)),
+            np.interp(self.beside_others, _OF_FORM, (0.0, 1.0)),
         )
         sure *= _IF_OF_FORM + (1.0 - _IF_OF_FORM) * float(beyond_form)
         sure *= doubt_of_shape(self.ripples)
@@ -190,6 +197,9 @@ def causes_with_tests(
                 ledger.share(without.model, fit.model, refit.model),
                 left,
                 closed(fitter, fit, without),
+                beside_others(
+                    fitter, fit, without, [f for f in fewer.values() if f is not without]
+                ),
                 ripples_passed(fit.model, effect, fitter.scales),
                 _own_sizes(ledger, fit, without, sizes),
                 over_noise,

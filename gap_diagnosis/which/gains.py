@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -124,6 +126,31 @@ def closed(fitter: CellFitter, after: CellFit, before: CellFit) -> float:
     if all_left < _GROWN:
         in_band = max(in_band, _closed_in_level(fitter, gained, after, before))
     return max(in_band, 1.0 - all_left) if fitter.evidence.slow else in_band
+
+
+def beside_others(
+    fitter: CellFitter, fit: CellFit, without: CellFit, others: Sequence[CellFit]
+) -> float:
+    """Return what a cause closes of the squared error over the most that another cause does.
+
+    In the band in which it gains most log-likelihood, on unseen parts.
+
+    Args:
+        fitter: that made all fits.
+        fit: with all causes.
+        without: the fit that lacks the cause.
+        others: the fits that each lack one of the others.
+
+    Returns:
+        Infinity where no other cause does anything there.
+    """
+    most = int(np.argmax(fitter.weights.gained(fit.left, without.left).sum(axis=0)))
+    own, *rest = (
+        float(np.sum((fitter.weights.counts * (each.left - fit.left))[:, most]))
+        for each in (without, *others)
+    )
+    most_of_rest = max(rest, default=0.0)
+    return own / most_of_rest if most_of_rest > 0.0 else math.inf
 
 
 def _closed_in_level(

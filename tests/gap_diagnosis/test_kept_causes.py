@@ -25,7 +25,7 @@ from gap_diagnosis.verdict.tested_causes import LEAST_PRESENT, causes_with_tests
 from gap_diagnosis.which import stepwise
 from gap_diagnosis.which.cell_fits import CellFitter
 from gap_diagnosis.which.found import Found
-from gap_diagnosis.which.gains import Gain
+from gap_diagnosis.which.gains import Gain, beside_others
 from gap_diagnosis.which.presence import beyond_zero
 
 CAUSES = {"torque_bias.torque_nm": 4.0, "delay.time_s": 1e-3}
@@ -170,15 +170,22 @@ def test_the_nearest_kin_of_what_no_effect_explains_is_told_in_a_note(searched):
 
 
 @pytest.mark.parametrize(
-    ("share", "left", "factor"),
-    [(0.02, 0.02, 0.6), (0.02, 0.0, 1.0), (0.02, 0.02 / 0.75 - 0.02, 0.8), (0.1, 0.1, 1.0)],
+    ("share", "left", "beside", "factor"),
+    [
+        (0.02, 0.02, 0.05, 0.6),
+        (0.02, 0.0, 0.05, 1.0),
+        (0.02, 0.02 / 0.75 - 0.02, 0.05, 0.8),
+        (0.1, 0.1, 0.05, 1.0),
+        (0.02, 0.02, 0.2, 0.8),
+        (0.02, 0.02, math.inf, 1.0),
+    ],
 )
 def test_what_closes_little_and_leaves_as_much_may_be_what_another_law_leaves(
-    searched, share, left, factor
+    searched, share, left, beside, factor
 ):
     fitter, fits = searched
     sure = max(causes_with_tests(fitter, fits[3], fits[0], SCATTER), key=lambda t: t.present)
-    closes = replace(sure, in_band=0.9, left=left, over_noise=0.0)
+    closes = replace(sure, in_band=0.9, left=left, over_noise=0.0, beside_others=beside)
     little = sure.share.model_copy(update={"value": share, "low": 0.5 * share})
     much = sure.share.model_copy(update={"value": 0.9, "low": 0.5 * share})
     doubted, sure = replace(closes, share=little), replace(closes, share=much)
@@ -194,3 +201,13 @@ def test_of_near_equivalents_the_one_that_closes_little_beside_the_other_names_i
     delay, lag = (replace(tested[0], effect=e, share=little) for e in ("delay", "actuator_lag"))
     assert _twice([delay, lag]) == [delay, lag]
     assert _twice([replace(delay, share=much), lag]) == []
+
+
+def test_what_a_cause_closes_beside_what_others_do_in_its_band(searched):
+    fitter, fits = searched
+    tested = {t.effect: t for t in causes_with_tests(fitter, fits[3], fits[0], SCATTER)}
+    ratio = tested["delay"].beside_others
+    assert ratio > 0.0
+    alone = tested["delay"].without
+    assert beside_others(fitter, fits[3], alone, []) == math.inf
+    assert beside_others(fitter, fits[3], alone, [alone]) == pytest.approx(1.0)
