@@ -142,11 +142,15 @@ class _Tries:
         self._largest = largest
         self._spaces: dict[int, Space] = {}
         self._found: list[tuple[float, _Candidate, np.ndarray]] = []
+        self._tried: set[tuple[int, float, _Base]] = set()
 
     def run(self, tries: Sequence[tuple[_Candidate, float]], base: _Base = "following") -> None:
         """Evaluate candidates at sizes, with base parameters of some kind."""
         most = self._largest
-        tries = [(c, float(np.clip(size, -most, most))) for c, size in tries if abs(size) > 1e-3]
+        within = [(c, float(np.clip(size, -most, most))) for c, size in tries if abs(size) > 1e-3]
+        new = {(id(c), size, base): (c, size) for c, size in within}
+        tries = [one for key, one in new.items() if key not in self._tried]
+        self._tried.update(new)
         if not tries:
             return
         points = [self._point(candidate, size, base) for candidate, size in tries]

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 from gap_cases import simulate_case
 
 from fjr_sim_node.plant import PLANT
 from gap_diagnosis.any_record import investigate
+from gap_diagnosis.further_looks import CLOSER, WIDER, says_more
 
 SHORT = {"base_frequency_hz": 0.5, "levels_rad": (4e-3, 1.2e-2), "transient_periods": 2}
 FEW = ("encoder_eccentricity", "torque_bias", "delay")
@@ -42,3 +46,32 @@ def test_an_eccentric_encoder_stays_one_where_all_parameters_would_be_off_alike(
     case = simulate_case(eccentric, seed=6, **SHORT)
     found = investigate(case.recorded, PLANT.defaults(), effects=FEW).diagnosis
     assert found.effects == ["encoder_eccentricity"]
+
+
+def test_a_wider_datasheet_must_not_need_more_causes_nor_end_at_a_limit(case):
+    nominal = PLANT.defaults()
+    found = investigate(case.recorded, nominal, effects=FEW)
+
+    def told(effects, chi2, at_limit=False):
+        gap = found.diagnosis.gap
+        explained = gap.refit.model_copy(update={"chi2_per_dof": chi2})
+        gap = gap.model_copy(update={"explained": explained})
+        diagnosis = found.diagnosis.model_copy(update={"effects": effects, "gap": gap})
+        best = found.fitted.found.best
+        if at_limit:
+            _, high = best.space.bounds()
+            x = best.solution.x.copy()
+            stiffness = list(best.space.nominal).index("k0")
+            x[stiffness] = high[stiffness]
+            best = replace(best, solution=replace(best.solution, x=x))
+        steps = [*found.fitted.found.steps[:-1], best]
+        fitted = replace(found.fitted, found=replace(found.fitted.found, steps=steps))
+        return replace(found, diagnosis=diagnosis, fitted=fitted)
+
+    assert np.isfinite(found.diagnosis.gap.refit.chi2_per_dof)
+    first, more, same = told(["delay"], 100.0), told(list(FEW), 10.0), told(["delay"], 10.0)
+    assert says_more(same, first, nominal, WIDER)
+    assert not says_more(more, first, nominal, WIDER)
+    assert says_more(more, first, nominal, CLOSER)
+    assert says_more(more, told([], 100.0), nominal, WIDER)
+    assert not says_more(told(["delay"], 10.0, at_limit=True), first, nominal, WIDER)

@@ -211,3 +211,15 @@ def test_what_a_cause_closes_beside_what_others_do_in_its_band(searched):
     alone = tested["delay"].without
     assert beside_others(fitter, fits[3], alone, []) == math.inf
     assert beside_others(fitter, fits[3], alone, [alone]) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(("first", "asked"), [("torque_saturation", 2), ("torque_bias", 1)])
+def test_starts_of_effects_are_looked_at_until_one_promises(searched, first, asked):
+    fitter, fits = searched
+    names = ("torque_saturation", "torque_bias")
+    screened = {effect: fitter.screening(fits[0], effect) for effect in names}
+    screened[first].gain = 1e6  # a linear prediction that says little
+    search = stepwise.Stepwise(fitter, names).extension
+    found = search._proposed(fits[0], screened, 1)
+    assert len(found) == asked and "torque_bias" in found
+    assert fitter.promises(fits[0], found["torque_bias"])

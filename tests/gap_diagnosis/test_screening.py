@@ -52,7 +52,10 @@ def test_a_size_beyond_the_largest_is_tried_at_the_largest():
     size = "torque_bias.torque_nm"
     tiny = 1e-3
 
+    tried: list[float] = []
+
     def linear(models: list[Model]) -> np.ndarray:
+        tried.extend(model.effects[size] for model in models if size in model.effects)
         sizes = np.array([model.effects.get(size, 0.0) for model in models])
         return (1.0 - sizes)[:, None] * np.ones(2 * HALF)
 
@@ -68,3 +71,4 @@ def test_a_size_beyond_the_largest_is_tried_at_the_largest():
     found = Screening(parent, model, [{size: tiny}], lambda _: space, linear, squares)
     point = found.proposals()[0][2]
     assert np.isclose(space.model(point).effects[size], LARGEST * tiny)
+    assert np.allclose(sorted(tried), [tiny, tiny, LARGEST * tiny])  # no size twice but the seed's
