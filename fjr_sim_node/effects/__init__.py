@@ -7,8 +7,9 @@ files, fits, documents and reports all read it. To add an effect, add its entry 
 `fx.EFFECT_PARAMETER`, in capitals, is the place of a parameter among the coefficients. What is the
 bare plant with other values (friction that a datasheet lacks) needs no kernel: `plant.with_added`.
 
-After the parameters stand three switches, one for each of these families: where none of its effects
-is on, its laws are passed over at once.
+After the parameters stand three switches, one for the laws of each of these families in `plant`:
+where none of them is on, they are passed over at once, and where no family is, the plant that is
+integrated is the bare one.
 
 An effect is off while its sizes have their defaults; then the plant is the bare one, bit for bit.
 Parameter names in files and in ROS are `effect.parameter`.
@@ -70,7 +71,10 @@ def _sizes(family: Collection[Effect]) -> tuple[int, ...]:
 
 
 _SIZES = _sizes(CATALOGUE)
-_FAMILY_SIZES = tuple(_sizes(family) for family in _FAMILIES.values())
+_FAMILY_SIZES = tuple(
+    _sizes([effect for effect in family if effect.law.startswith("plant.")])
+    for family in _FAMILIES.values()
+)
 
 
 def __getattr__(name: str) -> int:

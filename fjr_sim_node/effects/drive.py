@@ -54,7 +54,7 @@ DRIVE: tuple[Effect, ...] = (
         "actuator_lag",
         "The current loop follows the commanded torque with finite bandwidth.",
         "drive",
-        "simulation.rig:hold",
+        "plant.motion:derivative",
         "phase as delay, gain falls too",
         "first-order current loop",
         (size("time_constant_s", "s", "Time constant", 0.0, 0.1, negligible=0.005),),

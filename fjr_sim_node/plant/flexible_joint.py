@@ -236,6 +236,14 @@ def advance_with_effects(x, torque, duration, p, e, friction=1.0):
         e: parameters from `effects.coefficients`.
         friction: by what Coulomb and viscous friction have drifted, a factor.
     """
+    if e[fx.FRICTION_ON] == 0.0 and e[fx.TRANSMISSION_ON] == 0.0 and e[fx.DRIVE_ON] == 0.0:
+        coulomb, viscous = (
+            (friction * p[FS], friction * p[FSM]),
+            (friction * p[FV], friction * p[FVM]),
+        )
+        bare = (p[JM], p[J], *coulomb, *viscous, p[K0], p[K1])
+        x[0], x[1], x[2], x[3] = advance(x[0], x[1], x[2], x[3], torque, duration, bare)
+        return
     s = (x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[10])
     w = (x[7], x[8], x[9], x[0], x[2], deflection(x[0], x[2], e), 0.0, 0.0)
     s, w = _advance(s, torque, w, duration, with_bristles(p, friction, e), e)

@@ -39,6 +39,8 @@ _STEP = 1e-4
 _MODEL_ERROR = 1e-3  # of a line: error of the simulation itself
 _REFINED = 2  # trials whose separation is computed with refits that are not only linear
 _PASSES = 3
+_WORTH_A_PASS = 0.99  # of what differed before: a refit that leaves more ends
+_FAR = 4.0 * ENOUGH_SIGMA  # so does one that leaves more than this
 
 Pair = tuple[int, int]
 _Promise = tuple[Trial, Mapping[Pair, float]]
@@ -139,6 +141,7 @@ class _Bench:
         self._left = max(1.0, misfit) ** 0.5
         # What the recorded data say of each rival's parameters, by what it leaves.
         self._held = [np.linalg.qr(f.solution.jacobian)[1] for f in fits]
+        self._responses: dict[tuple[str, int], _Response] = {}
 
     @property
     def rigid(self) -> bool:
@@ -171,18 +174,23 @@ class _Bench:
 
     def linear(self, trial: Trial) -> dict[Pair, float]:
         """Return the separation of each pair with linear refits."""
-        responses = [self._response(trial, fit) for fit in self._fits]
-        return self._weaker(trial, lambda a, b: self._linear(trial, responses, a, b))
+        return self._weaker(trial, lambda a, b: self._linear(trial, a, b))
 
     def refitted(self, trial: Trial) -> dict[Pair, float]:
         """Return the separation of each pair with simulated refits."""
         return self._weaker(trial, lambda a, b: self._refit(trial, a, b))
 
     def _weaker(self, trial: Trial, separation) -> dict[Pair, float]:
-        """Return the smaller of the separations of both directions, over all realizations."""
-        pairs = itertools.combinations(range(len(self._fits)), 2)
-        more = len(trial.periods_rad) ** 0.5
-        return {(a, b): more * min(separation(a, b), separation(b, a)) for a, b in pairs}
+        """Return the smaller of the separations of both directions, over all realizations.
+
+        Where one direction does not separate a pair, the other one is not looked at.
+        """
+        found, more = {}, len(trial.periods_rad) ** 0.5
+        for a, b in itertools.combinations(range(len(self._fits)), 2):
+            found[a, b] = more * separation(a, b)
+            if found[a, b] >= LEAST_SIGMA:
+                found[a, b] = min(found[a, b], more * separation(b, a))
+        return found
 
     def _discarded(self, trial: Trial) -> int:
         return self._transient + (1 if trial.offset_rad else 0)
@@ -209,27 +217,38 @@ class _Bench:
         outputs = [0, 2][: self._noise.shape[0]]
         return line_spectrum(runs[:, outputs], trial.lines)
 
-    def _response(self, trial: Trial, fit: CellFit) -> _Response:
-        x, steps = fit.solution.x, _steps(fit, fit.solution.x)
-        points = np.vstack([x, x + np.diag(steps)])
-        lines = self._lines(trial, [fit.space.model(point) for point in points])
-        return _Response(lines[0], (lines[1:] - lines[0]) / steps[:, None, None])
+    def _response(self, trial: Trial, rival: int) -> _Response:
+        """Return the response of a rival as it was fitted to the record; simulated once."""
+        known = trial.description, rival
+        if known not in self._responses:
+            fit = self._fits[rival]
+            x, steps = fit.solution.x, _steps(fit, fit.solution.x)
+            points = np.vstack([x, x + np.diag(steps)])
+            lines = self._lines(trial, [fit.space.model(point) for point in points])
+            slopes = (lines[1:] - lines[0]) / steps[:, None, None]
+            self._responses[known] = _Response(lines[0], slopes)
+        return self._responses[known]
 
-    def _linear(
-        self, trial: Trial, responses: Sequence[_Response], truth: int, rival: int
-    ) -> float:
-        """Return what differs after a linear refit of the rival to the truth, in sigma."""
-        weight = self._weight(trial, responses[truth].lines)
-        mine = responses[rival]
-        d = _parts((mine.lines - responses[truth].lines) * weight)
+    def _begun(self, trial: Trial, truth: int, rival: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return by what a rival differs before its refit, and the slopes of that, in sigma."""
+        target, mine = self._response(trial, truth).lines, self._response(trial, rival)
+        weight = self._weight(trial, target)
         slopes = np.vstack([_parts(mine.slopes * weight).T, self._held[rival]])
-        d = np.concatenate([d, np.zeros(len(slopes) - d.size)])
+        d = _parts((mine.lines - target) * weight)
+        return np.concatenate([d, np.zeros(len(slopes) - d.size)]), slopes
+
+    def _linear(self, trial: Trial, truth: int, rival: int) -> float:
+        """Return what differs after a linear refit of the rival to the truth, in sigma."""
+        d, slopes = self._begun(trial, truth, rival)
         return float(np.linalg.norm(d - slopes @ np.linalg.lstsq(slopes, d, rcond=1e-9)[0]))
 
     def _refit(self, trial: Trial, truth: int, rival: int) -> float:
-        """Return what differs after the rival was refitted to the truth, in sigma."""
-        fit = self._fits[rival]
-        target = self._lines(trial, [self._fits[truth].model])[0]
+        """Return what differs after the rival was refitted to the truth, in sigma.
+
+        The refit ends once it is clear whether the two are separated.
+        """
+        fit, more = self._fits[rival], len(trial.periods_rad) ** 0.5
+        target = self._response(trial, truth).lines
         weight = self._weight(trial, target)
         low, high = fit.space.bounds()
 
@@ -240,18 +259,23 @@ class _Bench:
             return np.nan_to_num(np.hstack([_parts(lines * weight), held]), nan=1e6)
 
         x = fit.solution.x
-        d = differences(x[None])[0]
-        for _ in range(_PASSES):
-            steps = _steps(fit, x)
-            slopes = ((differences(x + np.diag(steps)) - d) / steps[:, None]).T
+        d, slopes = self._begun(trial, truth, rival)
+        for later in range(_PASSES):
+            if later:
+                steps = _steps(fit, x)
+                slopes = ((differences(x + np.diag(steps)) - d) / steps[:, None]).T
             change = np.linalg.lstsq(slopes, -d, rcond=1e-9)[0]
+            left = float(np.linalg.norm(d + slopes @ change))
+            if more * left < LEAST_SIGMA:
+                return left
             points = np.clip(x + np.array([[1.0], [0.3], [0.1]]) * change, low, high)
             found = differences(points)
-            costs = np.einsum("ij,ij->i", found, found)
+            before, costs = float(d @ d), np.einsum("ij,ij->i", found, found)
             best = int(np.argmin(costs))
-            if costs[best] >= d @ d:
+            if costs[best] < before:
+                x, d = points[best], found[best]
+            if costs[best] > min(_WORTH_A_PASS**2 * before, (_FAR / more) ** 2):
                 break
-            x, d = points[best], found[best]
         return float(np.linalg.norm(d))
 
     def _weight(self, trial: Trial, target: np.ndarray) -> np.ndarray:
