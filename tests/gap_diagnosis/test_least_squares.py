@@ -38,7 +38,8 @@ def test_the_valley_leads_to_its_minimum(start):
 @settings(max_examples=50)
 def test_no_fit_is_worse_than_its_start(start, steps):
     before = float(np.sum(rosenbrock(np.array([start]))[0] ** 2))
-    assert solve(rosenbrock, np.array(start), *FREE, most_steps=steps).cost <= before
+    found = solve(rosenbrock, np.array(start), *FREE, most_steps=steps)
+    assert found.cost <= before * (1.0 + 1e-12)  # both sums are rounded
 
 
 def test_bounds_hold_and_the_minimum_on_them_is_found():
