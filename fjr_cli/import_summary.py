@@ -25,8 +25,8 @@ def held_by(path: Path) -> Iterator[str]:
     yield f"{path.name} holds"
     width = max((len(one.name) for one in columns), default=0)
     for one in columns:
-        shape = " x ".join(map(str, one.shape)) or "1"
-        values = "no real numbers, or not all finite"
+        shape = " x ".join(map(str, one.shape))
+        values = "not all finite real numbers"
         if one.range is not None:
             values = f"from {one.range[0]:.6g} to {one.range[1]:.6g}"
         yield f"  {one.name:<{width}}  {shape:>10}  {values}"

@@ -13,7 +13,7 @@ from fjr_interface.bags.audit import LARGEST
 from fjr_kit.errors import InputError
 
 from . import hdf5, json_log, mat, numpy_file, text
-from .source import Heading, Names, refuse_bomb, sample_axis
+from .source import Heading, Names, is_text, refuse_bomb, sample_axis
 
 Result = TypeVar("Result")
 
@@ -111,15 +111,16 @@ def _of_file(path: Path, use: Callable[[Names], Result]) -> Result:
     suffixes = [suffix.lower() for suffix in path.suffixes[-2:]]
     packed = suffixes[-1:] == [".gz"]
     suffix = suffixes[-2] if packed and len(suffixes) > 1 else path.suffix.lower()
-    if suffix not in (_TEXTS if packed else READERS):
-        raise InputError(
-            f"{path}: cannot tell the format by the suffix {path.suffix!r}; it must be one of "
-            f"{', '.join(READERS)}, or text with .gz behind."
-        )
     if not path.is_file():
         raise InputError(f"{path}: there is no such file.")
     try:
-        return use(READERS[suffix](path))
+        reader = READERS.get(suffix) if suffix in _TEXTS or not packed else None
+        if reader is None and (packed or not is_text(path)):
+            raise InputError(
+                f"{path}: cannot tell the format by the suffix {path.suffix!r}; it must be one of "
+                f"{', '.join(READERS)}, or text, perhaps with .gz behind."
+            )
+        return use((reader or text.open_text)(path))
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror or error}).") from None
     except RecursionError:

@@ -20,7 +20,11 @@ _HEADER, _COMPRESSED = 128, 15
 
 
 def open_mat(path: Path) -> Names:
-    """Open a `.mat` file; a field of a structure is named `structure.field`; raise InputError."""
+    """Open a `.mat` file; raise InputError.
+
+    A field of a structure is named `structure.field`, one of an array of structures
+    `structure[0].field`.
+    """
     with path.open("rb") as file:
         if file.read(10) == b"MATLAB 7.3":
             return open_hdf5(path, "MATLAB 7.3")
@@ -68,6 +72,20 @@ def _flatten(structure: dict[str, Any], prefix: str = "") -> dict[str, Any]:
     for key, value in structure.items():
         if isinstance(value, dict):
             flat |= _flatten(value, f"{prefix}{key}.")
+        elif isinstance(value, (list, np.ndarray)) and len(many := _structures(value)):
+            for index, one in enumerate(many):
+                flat |= _flatten(one, f"{prefix}{key}[{index}].")
         elif isinstance(value, np.ndarray) and value.dtype.kind in "fiubc" and value.size > 1:
             flat[prefix + key] = value
     return flat
+
+
+def _structures(value: Any) -> list[dict[str, Any]]:
+    """Return the structures of an array or a cell array of nothing else; empty for anything else.
+
+    Simulink's scopes keep their signals so.
+    """
+    if isinstance(value, np.ndarray) and value.dtype != object:
+        return []
+    many = list(value.ravel()) if isinstance(value, np.ndarray) else value
+    return many if all(isinstance(one, dict) for one in many) else []

@@ -18,6 +18,10 @@ _INDEXED = re.compile(r"(?P<name>.*)\[(?P<index>[0-9]{1,9})\]")
 LEAST_BYTES, EXPANSION = 2**25, 32
 """A file may hold so many bytes of numbers, and so many times its size: a few hundred bytes of an
 archive can stand for gigabytes."""
+_LOOKED_AT = 4096
+"""Bytes that tell whether a file is text."""
+_UTF_16 = (b"\xff\xfe", b"\xfe\xff")
+_NEVER_IN_TEXT = {*range(7), *range(14, 27), *range(28, 32)}
 _SHOWN = 20
 """Most names of columns that a sentence shows."""
 
@@ -91,6 +95,13 @@ def refuse_bomb(path: Path, size: int, least: int = LEAST_BYTES) -> None:
         )
 
 
+def is_text(path: Path) -> bool:
+    """Tell whether a file begins as text does, without a zero byte that no mark of UTF-16 tells."""
+    with path.open("rb") as file:
+        begin = file.read(_LOOKED_AT)
+    return bool(begin) and (begin[:2] in _UTF_16 or not set(begin) & _NEVER_IN_TEXT)
+
+
 def read_text(path: Path) -> str:
     """Return the text of a file, unpacked if it ends in `.gz`; raise InputError if it is none.
 
@@ -98,7 +109,7 @@ def read_text(path: Path) -> str:
     Windows write it, unless it holds zero bytes.
     """
     content = _unpacked(path) if path.suffix.lower() == ".gz" else path.read_bytes()
-    utf_16 = content[:2] in (b"\xff\xfe", b"\xfe\xff")
+    utf_16 = content[:2] in _UTF_16
     for encoding in ("utf-16",) if utf_16 else ("utf-8-sig", "latin-1"):
         try:
             text = content.decode(encoding)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,6 +13,7 @@ import numpy as np
 
 from fjr_kit.errors import InputError, shown
 
+from .clock_stamps import is_stamp, rejoined, since
 from .source import Heading, Names, read_text
 
 _DELIMITERS = ("\t", ";", ",", "|", None)
@@ -19,9 +21,11 @@ _DELIMITERS = ("\t", ";", ",", "|", None)
 _COMMENTS = ("#", "%", "//", "!", "$")
 _LOOKED_AT = 100
 """Lines that tell delimiter and decimal mark."""
+_LABVIEW = "Comment"
+"""Name of a last column in LabVIEW's measurement files, whose rows say nothing there."""
 _NOWHERE = 2**62
 """Number of a line that no file has."""
-_NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?|[+-]?(nan|inf(inity)?)", re.I)
+_NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eEdD][+-]?\d+)?|[+-]?(nan|inf(inity)?)", re.I)
 
 
 @dataclass(frozen=True)
@@ -34,12 +38,11 @@ class _Layout:
     def cells(self, line: str) -> list[str]:
         """Return the cells of a line, stripped."""
         if self.delimiter is None:
-            return line.split()
+            return rejoined(line.split()) if ":" in line else line.split()
         line = line.strip(" \r\n")
         if '"' in line:
             return [cell.strip() for cell in next(csv.reader([line], delimiter=self.delimiter))]
-        cells = [cell.strip() for cell in line.split(self.delimiter)]
-        return cells[:-1] if len(cells) > 1 and not cells[-1] else cells
+        return [cell.strip() for cell in line.split(self.delimiter)]
 
     def is_number(self, cell: str) -> bool:
         """Tell whether a cell holds a number."""
@@ -50,10 +53,58 @@ class _Layout:
         """Return a cell with a decimal point."""
         return cell.replace(",", ".", 1) if self.decimal_comma else cell
 
-    def width(self, line: str) -> int:
-        """Return how many numbers the line holds; 0 if anything in it is none."""
-        cells = self.cells(line)
-        return len(cells) if cells and all(map(self.is_number, cells)) else 0
+    def value(self, cell: str) -> float:
+        """Return the number of a cell; raise ValueError if there is none."""
+        plain = self.plain(cell)
+        return float(plain.replace("D", "E").replace("d", "e") if "d" in plain.lower() else plain)
+
+    def holds(self, cell: str) -> bool:
+        """Tell whether a cell holds a number, or a stamp of calendar and clock."""
+        return self.is_number(cell) or is_stamp(cell)
+
+
+@dataclass(frozen=True)
+class _Grid:
+    """The cells of a table: how many a row has, and in which columns most of them are numbers.
+
+    Other columns may hold anything, or nothing: the mode of a drive, a status in hexadecimals.
+    """
+
+    layout: _Layout
+    width: int
+    numbers: tuple[int, ...]
+
+    @classmethod
+    def of(cls, layout: _Layout, lines: Sequence[str]) -> _Grid:
+        """Return the grid by which most of some lines hold numbers."""
+        rows = [layout.cells(line) for line in lines if not _is_comment(line)]
+        held = [[layout.holds(cell) for cell in row] for row in rows]
+        counts = Counter(len(row) for row in held if any(row))
+        if not counts:
+            return cls(layout, 0, ())
+        width = max(counts, key=lambda w: (counts[w], w))
+        fitting = [row for row in held if len(row) == width]
+        often = [2 * sum(column) >= len(fitting) for column in zip(*fitting, strict=True)]
+        return cls(layout, width, tuple(np.flatnonzero(often)))
+
+    def is_row(self, cells: Sequence[str]) -> bool:
+        """Tell whether cells are those of a row of numbers, of which some may be missing."""
+        if len(cells) != self.width or not self.numbers:
+            return False
+        of_numbers = [cells[at] for at in self.numbers]
+        there = [cell for cell in of_numbers if cell]
+        return bool(there) and all(map(self.layout.holds, there))
+
+    def fitness(self, lines: Sequence[str]) -> tuple[float, ...]:
+        """Return how well it fits lines: rows, names above, numbers in a row, how common it is."""
+        found = [self.is_row(self.layout.cells(line)) for line in lines]
+        first = found.index(True) if any(found) else 1
+        above = [self.layout.cells(_uncommented(line)) for line in lines[:first]]
+        headed = self.width > 1 and any(len(names) == self.width for names in above[-2:])
+        share = len(self.numbers) / max(self.width, 1)
+        named = max(map(len, above), default=0)
+        rank = -_LAYOUTS.index(self.layout)
+        return sum(found), headed, len(self.numbers), share, named, rank
 
 
 _LAYOUTS = tuple(
@@ -65,11 +116,14 @@ def open_text(path: Path) -> Names:
     """Open a table; columns without names are called 0, 1, ...; raise InputError."""
     text = read_text(path)
     first = [line for _, line in _lines(text, _LOOKED_AT)]
-    layout = max(_LAYOUTS, key=lambda one: _fitness(one, first))
-    start, names, units = _start(layout, text)
+    grid = max((_Grid.of(one, first) for one in _LAYOUTS), key=lambda one: one.fitness(first))
+    layout = grid.layout
+    start, names, units = _start(grid, text)
     places = {name: at for at, name in reversed(list(enumerate(names)))}
     numbers = [each for at in range(len(names)) for each in (str(at), f"[{at}]")]
-    titled = [Heading(name, units[at] if units else "") for at, name in enumerate(names)]
+    stamps = _stamps(layout, text, start)
+    units = ["s" if at in stamps else "".join(units[at : at + 1]) for at in range(len(names))]
+    titled = [Heading(name, unit) for name, unit in zip(names, units, strict=True)]
     headings = {number: titled[int(number.strip("[]"))] for number in numbers}
     headings |= {name: titled[at] for name, at in places.items()}
 
@@ -99,64 +153,75 @@ def _lines(text: str, most: int | None = None) -> Iterator[tuple[int, str]]:
             yield number, line
 
 
-def _fitness(layout: _Layout, lines: list[str]) -> tuple[int, int, int, int]:
-    """Return how well a layout fits: rows of one width, columns, names above, how common it is."""
-    widths = [layout.width(line) for line in lines]
-    usual = max(set(widths), key=lambda w: (bool(w), widths.count(w), w), default=0)
-    named = max((len(layout.cells(line.strip().lstrip("#%/! "))) for line in lines[:1]), default=0)
-    return (widths.count(usual) if usual else 0, usual, named, -_LAYOUTS.index(layout))
-
-
 def _is_comment(line: str) -> bool:
     return line.lstrip().startswith(_COMMENTS)
 
 
-def _start(layout: _Layout, text: str) -> tuple[int, list[str], list[str]]:
+def _uncommented(line: str) -> str:
+    return line.strip(" \r\n").lstrip("#%/! ")
+
+
+def _start(grid: _Grid, text: str) -> tuple[int, list[str], list[str]]:
     """Return the number of the first line of numbers, the names of the columns, and their units.
 
     The names stand in one of the two lines above, the other may hold units, else none are
     returned; without names the columns are numbered. A line above in which some cells are numbers
     is a damaged row.
     """
-    above: list[tuple[int, list[str], bool]] = []
+    layout, above = grid.layout, list[tuple[int, list[str], bool]]()
     for number, line in _lines(text, _LOOKED_AT):
-        width = layout.width(line)
-        if not width:
-            bare = line.strip().lstrip("#%/! ")
-            names = [cell.strip("# %") for cell in layout.cells(bare)]
+        if not grid.is_row(layout.cells(line)) or _is_comment(line):
+            names = [cell.strip("# %") for cell in layout.cells(_uncommented(line))]
+            names = names[:-1] if names[-1:] in ([_LABVIEW], [""]) else names
             above = [*above[-1:], (number, names, _is_comment(line))]
             continue
-        fitting = [each for each in above if len(each[1]) == width]
+        columns = grid.width - (not layout.cells(line)[-1])  # without one after the last delimiter
+        fitting = [each for each in above if len(each[1]) in (columns, grid.width)]
         for row, names, comment in fitting:
-            if not comment and any(map(layout.is_number, names)):
-                return row, [str(index) for index in range(width)], []
+            if not comment and any(layout.holds(names[at]) for at in grid.numbers):
+                return row, [str(index) for index in range(columns)], []
         if fitting:
             return number, fitting[0][1], fitting[1][1] if len(fitting) > 1 else []
         if above and not above[0][2] and layout.delimiter is not None and len(above[0][1]) > 1:
             return number, above[0][1], []  # the rows are said to be too short or too long
-        return number, [str(index) for index in range(width)], []
+        return number, [str(index) for index in range(columns)], []
     return _NOWHERE, above[0][1] if above else [], []
+
+
+def _stamps(layout: _Layout, text: str, start: int) -> list[int]:
+    """Return which columns of the first line of numbers hold stamps of calendar and clock."""
+    for number, line in _lines(text):
+        if number >= start and not _is_comment(line):
+            return [at for at, cell in enumerate(layout.cells(line)) if is_stamp(cell)]
+    return []
 
 
 def _column(
     path: Path, layout: _Layout, text: str, start: int, index: int, columns: int, name: str
 ) -> np.ndarray:
-    """Return one column; raise InputError that names the line."""
-    values = []
+    """Return one column, stamps in s from the first; raise InputError that names the line."""
+    values: list[float] = []
+    read: Callable[[str], float] = layout.value
+    kind = "number"
     for number, line in _lines(text):
         if number < start or _is_comment(line):
             continue
         cells = layout.cells(line)
+        if len(cells) == columns + 1 and not cells[-1]:
+            cells = cells[:-1]
         if len(cells) != columns:
             raise InputError(
                 f"{path}: line {number} has {len(cells)} columns, not {columns}; repair or cut it."
             )
+        cell = cells[index]
         try:
-            values.append(float(layout.plain(cells[index])))
+            if not values and is_stamp(cell):
+                read, kind = since(cell), "stamp of calendar and clock"
+            values.append(read(cell))
         except ValueError:
             raise InputError(
-                f"{path}: line {number}: {shown(cells[index])} in column {name} is not a number; "
-                "repair or cut it."
+                f"{path}: line {number}: {shown(cell)} in column {name} is not a {kind}; repair "
+                "or cut it."
             ) from None
     if not values:
         raise InputError(f"{path}: holds no numbers below the line of names.")

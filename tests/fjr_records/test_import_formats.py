@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import json
+from datetime import datetime, timedelta
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from scipy.io import savemat
 
 from fjr_cli.import_summary import held_by
 from fjr_kit.errors import InputError
+from fjr_records.importers.clock_stamps import since
 from fjr_records.importers.columns import READERS, held_columns, read_columns
 
 T = np.arange(40) / 100.0
@@ -44,6 +46,8 @@ TEXTS = {
     "quoted.csv": ('"t","r, set","y"\n' + table(","), ("r, set", "y")),
     "bars.txt": ("t | r | y\n" + table(" | "), "ry"),
     "blank_lines.csv": ("\n\nt,r,y\n\n" + table(",").replace("\n", "\n\n"), "ry"),
+    "fortran.txt": (table(" ").replace("e-", "D-"), "12"),
+    "unknown_suffix.lvm": ("X t\n***End***\nt\tr\ty\tComment\n" + table("\t", after="\t"), "ry"),
     "packed.txt.gz": ("Time, Goal Angle, y\n" + table(", "), ("Goal Angle", "y")),
 }
 
@@ -70,6 +74,79 @@ def test_what_a_text_holds_can_be_read_by_the_names_that_are_listed(tmp_path, na
     assert len(held) == 3
     for one, column in zip(held, read.values(), strict=True):
         assert one.shape == (40,) and one.range == (column.min(), column.max())
+
+
+OTHERS = {
+    "words": "AUTO",
+    "truths": "True",
+    "hexadecimals": "0x1A37",
+    "nothing": "",
+    "two words": "not ready",
+    "decimal comma": "1,5 A",
+}
+
+
+@pytest.mark.parametrize("delimiter", [",", ";", "\t", "|"])
+@pytest.mark.parametrize("place", [0, 1, 3])
+@pytest.mark.parametrize("kind", OTHERS)
+def test_columns_that_hold_no_numbers_are_no_obstacle(tmp_path, kind, place, delimiter):
+    if delimiter in OTHERS[kind]:
+        pytest.skip("such a cell would be two")
+    rows = [["t", "r", "y"], *([repr(x) for x in row] for row in ROWS)]
+    for row in rows:
+        row.insert(place, OTHERS[kind] if row[-1] != "y" else "mode")
+    (tmp_path / "a.csv").write_text("\n".join(map(delimiter.join, rows)))
+    found = read_columns(tmp_path / "a.csv", ["r", "y"])[0]
+    np.testing.assert_array_equal(list(found.values()), [R, Y])
+    assert [one.name for one in held_columns(tmp_path / "a.csv")[0] if one.range] == ["t", "r", "y"]
+    with pytest.raises(InputError, match=f"line 2: '{OTHERS[kind]}' in column mode is not a num"):
+        read_columns(tmp_path / "a.csv", ["mode"])
+
+
+def test_a_slow_signal_beside_fast_ones_is_no_obstacle(tmp_path):
+    rows = [f"{r},{y},{25.0 if k % 10 == 0 else ''}" for k, (_, r, y) in enumerate(ROWS)]
+    (tmp_path / "a.csv").write_text("r,y,temperature\n" + "\n".join(rows))
+    found = read_columns(tmp_path / "a.csv", ["r", "y"])[0]
+    np.testing.assert_array_equal(list(found.values()), [R, Y])
+
+
+STAMPS = {
+    "iso": ("2026-01-31 23:59:59.750", "2026-02-01 00:00:00.250"),
+    "zone": ("2026-01-31T23:59:59.750Z", "2026-02-01T01:00:00.250+01:00"),
+    "dots": ("31.01.2026 23:59:59,75", "1.2.2026 0:00:00,25"),
+    "slashes": ("2026/1/31_23:59:59.75", "2026/2/1_00:00:00.25"),
+    "clock": ("9:59:59.75", "10:00:00.25"),
+}
+
+
+@pytest.mark.parametrize("delimiter", [";", "\t", " "])
+@pytest.mark.parametrize("kind", STAMPS)
+def test_stamps_of_calendar_and_clock_are_seconds_from_the_first(tmp_path, kind, delimiter):
+    rows = [delimiter.join([stamp, "1.5", "2.5"]) for stamp in STAMPS[kind]]
+    (tmp_path / "a.txt").write_text("\n".join([delimiter.join("try"), *rows]))
+    found, headings = read_columns(tmp_path / "a.txt", ["t", "y"])
+    np.testing.assert_allclose(found["t"], [0.0, 0.5], atol=1e-9)
+    np.testing.assert_array_equal(found["y"], [2.5, 2.5])
+    assert headings["t"].unit == "s"
+
+
+@given(st.datetimes(datetime(1990, 1, 1), datetime(2090, 1, 1)), st.integers(0, 10**10))
+def test_any_two_stamps_differ_as_their_instants_do(first, later_us):
+    second = first + timedelta(microseconds=later_us)
+    elapsed = since(first.isoformat(" ", "microseconds"))
+    assert elapsed(second.isoformat("T", "microseconds")) == pytest.approx(
+        1e-6 * later_us, abs=1e-7
+    )
+
+
+def test_structures_in_arrays_as_the_scopes_of_simulink_keep_them(tmp_path):
+    signals = np.zeros(2, dtype=[("values", object), ("label", object)])
+    signals["values"], signals["label"] = [R[:, None], Y[:, None]], ["r", "y"]
+    cells = np.array([{"values": R}, {"values": Y}], dtype=object)
+    savemat(tmp_path / "a.mat", {"scope": {"time": T, "signals": signals}, "cells": cells})
+    names = [f"{where}[{k}].values" for where in ("scope.signals", "cells") for k in range(2)]
+    found = read_columns(tmp_path / "a.mat", names)[0]
+    np.testing.assert_array_equal(list(found.values()), [R, Y, R, Y])
 
 
 def test_what_a_mat_file_holds_is_listed_whatever_it_is(tmp_path):
@@ -191,7 +268,7 @@ BROKEN = [
     ("a.csv", "r,y\n1,2\n3,x\n", "line 3: 'x' in column y is not a number"),
     ("a.csv", "1,x\n3,4\n5,6\n", "there is no r; the file holds 0, 1"),
     ("a.csv", "r,y\n1,nan\n3,4\n", "y holds nan at sample 0"),
-    ("a.csv", "r,y\n1,\n3,4\n", "line 2 has 1 columns, not 2"),
+    ("a.csv", "r,y\n1,\n3,4\n", "line 2: '' in column y is not a number"),
     ("a.csv", "r,y,y\n1,2,3\n3,4,5\n", "the column y is there 2 times; rename one, or name it by"),
     ("a.csv", "r,y\n1\n2\n", "line 2 has 1 columns, not 2"),
     ("a.csv", "a\0b", "is not a text file"),
@@ -214,7 +291,11 @@ BROKEN = [
     ("a.jsonl", '{"r": 1, "y": 2}\n' * 1500 + "{", "entry 1501"),
     ("a.mat", "x" * 100, "is not a readable MAT file"),
     ("a.npz", "x" * 300, "is not a NPZ archive"),
-    ("a.parquet", "PAR1", "cannot tell the format"),
+    ("a.parquet", "PAR1\0\1", "cannot tell the format"),
+    ("a.lvm", "r y\nup down\n", "holds no numbers below the line of names"),
+    ("a.csv", "r,y\n12:00:00,1\noops,2\n", "line 3: 'oops' in column r is not a stamp of cal"),
+    ("a.csv", "r,y\n12:00:00,1\n12:00:01,on\n", "line 3: 'on' in column y is not a number"),
+    ("a.csv", "r,y\n2026-02-30 1:00:00,1\n", "line 2: '2026-02-30 1:00:00' in column r is not a"),
     ("a.gz", "", "cannot tell the format"),
 ]  # fmt: skip
 
