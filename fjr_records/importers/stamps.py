@@ -83,14 +83,7 @@ def read_timing(
         return Timing(None, given_hz)
     if time.size < 2 or not time[-1] > time[0]:
         raise InputError(f"{path}: the time column does not increase; map another column.")
-    step = (time[-1] - time[0]) / (time.size - 1)
-    if step * FASTEST_HZ < 1.0:
-        raise InputError(
-            f"{path}: the time column goes on by {step:g} s, more than {FASTEST_HZ:g} samples in a "
-            "second; correct its unit."
-        )
-    steps = np.diff(time)
-    _refuse_slow(path, time, slow)
+    step, steps = (time[-1] - time[0]) / (time.size - 1), np.diff(time)
     falling = np.flatnonzero(steps < 0)
     if falling.size:
         at = int(falling[0])
@@ -98,6 +91,12 @@ def read_timing(
             f"{path}: the time column goes back from {time[at]:g} to {time[at + 1]:g} s after "
             f"sample {at}; map another column, or cut the record there."
         )
+    if step * FASTEST_HZ < 1.0:
+        raise InputError(
+            f"{path}: the time column goes on by {step:g} s, more than {FASTEST_HZ:g} samples in a "
+            "second; correct its unit."
+        )
+    _refuse_slow(path, time, slow)
     stretch = _longest_stretch(steps)
     if stretch is not None:
         return _of_stretch(path, time, given_hz, stretch, slow)
