@@ -25,7 +25,9 @@ _LABVIEW = "Comment"
 """Name of a last column in LabVIEW's measurement files, whose rows say nothing there."""
 _NOWHERE = 2**62
 """Number of a line that no file has."""
-_NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eEdD][+-]?\d+)?|[+-]?(nan|inf(inity)?)", re.I)
+_NUMBER = re.compile(
+    r"[+-]?(\d+(\.\d*)?|\.\d+)([ed][+-]?\d+)?|[+-]?(nan|inf(inity)?)", re.I | re.ASCII
+)
 
 
 @dataclass(frozen=True)
