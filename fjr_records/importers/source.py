@@ -18,7 +18,7 @@ _INDEXED = re.compile(r"(?P<name>.*)\[(?P<index>[0-9]{1,9})\]")
 LEAST_BYTES, EXPANSION = 2**25, 32
 """A file may hold so many bytes of numbers, and so many times its size: a few hundred bytes of an
 archive can stand for gigabytes."""
-_LOOKED_AT = 4096
+_LOOKED_AT = 2**16
 """Bytes that tell whether a file is text."""
 _UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 _NEVER_IN_TEXT = {*range(7), *range(14, 27), *range(28, 32)}
@@ -96,10 +96,12 @@ def refuse_bomb(path: Path, size: int, least: int = LEAST_BYTES) -> None:
 
 
 def is_text(path: Path) -> bool:
-    """Tell whether a file begins as text does, without a zero byte that no mark of UTF-16 tells."""
+    """Tell whether a file begins as text of several lines, without bytes that no text holds."""
     with path.open("rb") as file:
         begin = file.read(_LOOKED_AT)
-    return bool(begin) and (begin[:2] in _UTF_16 or not set(begin) & _NEVER_IN_TEXT)
+    if begin[:2] in _UTF_16:
+        return True
+    return bool({*b"\r\n"} & set(begin)) and not set(begin) & _NEVER_IN_TEXT
 
 
 def read_text(path: Path) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from gap_diagnosis.which.least_squares import solve
@@ -35,11 +35,12 @@ def test_the_valley_leads_to_its_minimum(start):
 
 
 @given(st.tuples(st.floats(-5.0, 5.0), st.floats(-5.0, 5.0)), st.integers(0, 5))
+@example((-0.15, 0.5), 0)
 @settings(max_examples=50)
 def test_no_fit_is_worse_than_its_start(start, steps):
-    before = float(np.sum(rosenbrock(np.array([start]))[0] ** 2))
-    found = solve(rosenbrock, np.array(start), *FREE, most_steps=steps)
-    assert found.cost <= before * (1.0 + 1e-12)  # both sums are rounded
+    begun = rosenbrock(np.array([start]))[0]
+    before = float(begun @ begun)  # summed as the search does, so that rounding is the same
+    assert solve(rosenbrock, np.array(start), *FREE, most_steps=steps).cost <= before
 
 
 def test_bounds_hold_and_the_minimum_on_them_is_found():
