@@ -34,6 +34,11 @@ UNSTEADY = (
     "beside a remainder, which a change within a run is a part of."
 )
 
+NOTHING_NAMED = (
+    "The whole runs, whose periods need not repeat, were searched all the same; nothing is named, "
+    "and the errors are theirs."
+)
+
 DRIFTS = (
     "From run to run friction goes one way, so the whole runs were searched for causes beside a "
     "drift of friction."
@@ -98,12 +103,13 @@ def _unsteady(view: SteadyView, nominal: Model, order: Order) -> Investigation:
     gate = drift_gate(whole.fitted.fitter, whole.fitted.found.steps[0])
     gates = replace(view.gates, gates=(*view.gates.gates, gate))
     found = _stopped(replace(view, gates=gates), nominal)
-    if gate.passed and not drifts:
-        return found
-    steadier = [g for g in gates.gates if g.passed or g.hint != "bad_data" or not g.of_periods]
-    told = stopped("nonstationary", replace(gates, gates=tuple(steadier)))
+    told = found.diagnosis
+    if drifts or not gate.passed:
+        steadier = [g for g in gates.gates if g.passed or g.hint != "bad_data" or not g.of_periods]
+        told = stopped("nonstationary", replace(gates, gates=tuple(steadier)))
     seen = {name: getattr(whole.diagnosis, name) for name in ("gap", "steps", "evidence")}
-    return replace(found, diagnosis=told.model_copy(update=seen))
+    notes = [*told.notes, NOTHING_NAMED, *whole.diagnosis.notes]
+    return replace(found, diagnosis=told.model_copy(update={**seen, "notes": notes}))
 
 
 def _beside_drift(recorded: RecordedExperiment, order: Order) -> Investigation:

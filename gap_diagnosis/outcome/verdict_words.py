@@ -103,8 +103,8 @@ WORDS: dict[Verdict, Words] = {
     ),
     "bad_data": Words(
         "The data do not allow a diagnosis",
-        "A gate failed: something other than the plant explains a difference, so nothing was "
-        "fitted.",
+        "A gate failed: something other than the plant explains a difference, so no cause is "
+        "named.",
         "Mend what the gate names, and record again if need be.",
         "The gate's limit and value are in the table; the other gates were tested too.",
     ),

@@ -21,7 +21,9 @@ from gap_diagnosis.gates.bags_gate import friction_follows_time
 from gap_diagnosis.gates.gate_checks import check_gates
 from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.model.rig_model import Model
-from gap_diagnosis.steady_periods import UNSTEADY
+from gap_diagnosis.outcome.diagnosis import Diagnosis
+from gap_diagnosis.report.gap_output import write_diagnosis
+from gap_diagnosis.steady_periods import NOTHING_NAMED, UNSTEADY
 from gap_diagnosis.which.cell_fits import DRIFT, CellFitter
 from gap_diagnosis.which.gains import gain
 
@@ -115,6 +117,19 @@ def test_a_transient_is_no_drift():
     assert any("still transient" in note for note in found.diagnosis.notes)
     last = found.steady.gates.gates[-1]
     assert last.name == "stationary within runs" and last.passed
+
+
+def test_bad_data_whose_whole_runs_were_searched_tell_what_was_left(tmp_path):
+    recorded = simulate_case(
+        seed=4, realizations=3, **{**SHORT, **NO_FREE_LINES, "transient_periods": 0}
+    ).recorded
+    found = investigate(recorded, PLANT.defaults(), effects=KNOWN)
+    write_diagnosis(found, tmp_path / "out")
+    told = Diagnosis.read(tmp_path / "out" / "diagnosis.json")
+    assert told.verdict == "bad_data" and not told.causes and NOTHING_NAMED in told.notes
+    nominal, refit = (step.nrmse_position for step in told.steps)
+    assert nominal > refit == told.gap.refit.nrmse_position > 0.0
+    assert NOTHING_NAMED in (tmp_path / "out" / "report.html").read_text()
 
 
 def test_a_drift_of_a_rigid_axis_is_told_from_a_transient():
