@@ -291,5 +291,7 @@ def test_bad_data_is_reported_with_the_rig_alone(tmp_path):
     report = write_diagnosis(found, tmp_path / "out")
     page = Page(report.read_text())
     assert page.data()["overview"] == {} and "bla" in page.data()["levels"][0]
+    headings = re.findall("<h2>(.*?)</h2>", report.read_text())
+    assert "How far" in headings and not {"Where", "Which"} & {*headings}
     assert not (tmp_path / "out" / "updated.yaml").exists()
     assert Diagnosis.read(tmp_path / "out" / "diagnosis.json").verdict == "bad_data"
