@@ -74,6 +74,19 @@ def test_an_effect_of_size_zero_is_off_whatever_its_other_parameters(identifier)
 
 
 @pytest.mark.parametrize("identifier", IDENTIFIERS)
+def test_laws_that_are_passed_over_would_have_done_nothing(identifier):
+    on = effects.coefficients(moderate(identifier))
+    if on is None:
+        assert effects.EFFECTS[identifier].of_bare_plant
+        return
+    in_plant = effects.EFFECTS[identifier].law.startswith("plant.")
+    assert on[-3:].any() == in_plant  # a law before or behind the plant leaves it bare
+    forced = np.array([*on[:-3], 1.0, 1.0, 1.0])
+    r = multisine_reference(7e-3)[:1500]
+    assert same(simulate(r, on, **axis(identifier)), simulate(r, forced, **axis(identifier)))
+
+
+@pytest.mark.parametrize("identifier", IDENTIFIERS)
 def test_a_moderate_size_shows(identifier):
     r = multisine_reference(2e-2 if identifier == "torque_saturation" else 2e-3)[:4000]
     bare = simulate(r, None, 20.0, **axis(identifier))
