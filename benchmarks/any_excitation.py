@@ -1,9 +1,9 @@
 """The BLA from any excitation on random rigs: do 95 % discs hold the truth, and do signals agree?
 
 Run `python benchmarks/any_excitation.py` (--quick: fewer rigs). Each case is one record of
-30 s of a rig of its own, under noise, a chirp or a multisine of equal flat power, analysed by
-itself. Truth of a linear rig: its sampled response. Truth of a rig with friction and a hardening
-transmission: the pooled response of 40 multisines of that power; beside it the statistical
+30 s of a rig, three of each rig, under noise, a chirp or a multisine of equal flat power, analysed
+by itself. Truth of a linear rig: its sampled response. Truth of a rig with friction and a hardening
+transmission: the pooled response of 160 multisines of that power; beside it the statistical
 linearisation. A trapezoid shows which lines it excites.
 """
 
@@ -28,7 +28,9 @@ from fjr_sim_node.theory.statistical_linearisation import linearise
 KINDS = ("noise", "chirp", "multisine")
 CASES = ((True, 30.0, 0.03), (True, 30.0, 1e-3), (False, 30.0, 1e-3), (False, 30.0, 0.01))
 """(linear, seconds, encoder noise over rms of the reference)."""
-TRUTH_RUNS = 40
+TRUTH_RUNS = 160
+RECORDS = 3
+"""Of each kind of every rig."""
 EVERY = 4
 """Every how many lines the truth is looked at."""
 Row = tuple[int, int, int, float, float]
@@ -43,18 +45,25 @@ def many_runs(rig: rigs.Rig, seconds: float) -> list[Run]:
     ]
 
 
-def truth_of(
-    rig: rigs.Rig, runs: list[Run], seconds: float, frequency_hz: np.ndarray
-) -> np.ndarray:
-    """Return the BLA of a rig for multisines, complex (F,), rad/(N m)."""
-    if rig.linear:
-        return rigs.truth(rig, frequency_hz)
-    half = np.maximum(9.0 / seconds, 0.02 * frequency_hz)
-    fits = [
-        fit_window(runs, at, (max(at - h, 1.0 / seconds), at + h), ORDER)
-        for at, h in zip(frequency_hz, half, strict=True)
-    ]
-    return np.array([np.nan if fit is None else fit.g for fit in fits])
+class Truth:
+    """The BLA of a rig for multisines, complex, rad/(N m); each frequency is computed once."""
+
+    def __init__(self, rig: rigs.Rig, seconds: float) -> None:
+        self._rig, self._seconds = rig, seconds
+        self._runs = many_runs(rig, seconds)
+        self._known: dict[float, complex] = {}
+
+    def at(self, frequency_hz: np.ndarray) -> np.ndarray:
+        """Return it at some frequencies, complex (F,)."""
+        if self._rig.linear:
+            return rigs.truth(self._rig, frequency_hz)
+        for f in frequency_hz:
+            if f not in self._known:
+                half = max(9.0 / self._seconds, 0.02 * f)
+                band = max(f - half, 1.0 / self._seconds), f + half
+                fit = fit_window(self._runs, f, band, ORDER)
+                self._known[f] = complex(np.nan) if fit is None else fit.g
+        return np.array([self._known[f] for f in frequency_hz])
 
 
 def linearised(rig: rigs.Rig, seconds: float, frequency_hz: np.ndarray) -> np.ndarray:
@@ -72,28 +81,31 @@ def linearised(rig: rigs.Rig, seconds: float, frequency_hz: np.ndarray) -> np.nd
 def judged(seed: int, linear: bool, seconds: float, noise: float) -> dict[str, Row]:
     """Return a row for each kind of excitation, and for statistical linearisation."""
     rig = rigs.random_rig(seed, linear=linear)
+    truth = Truth(rig, seconds)
     rows: dict[str, Row] = {}
-    many = many_runs(rig, seconds)
     for kind in KINDS:
-        record = rigs.record(rig, kind, seconds, noise=noise, seed=seed)
-        found = arbitrary_bla([run_of([record], rigs.RATE)], rigs.RATE)
-        bla = found.bla
-        keep = np.flatnonzero(bla.reliable)[::EVERY]
-        f, g, radius = bla.frequency_hz[keep], bla.g[keep], bla.radius_95[keep]
-        exact = truth_of(rig, many, seconds, f)
-        error = np.abs(20.0 * np.log10(np.abs(g / exact)))
-        held = int((np.abs(g - exact) <= radius).sum())
-        lost = int((found.left_out_hz < rigs.BAND_HZ[1]).sum())
-        rows[kind] = (
-            held,
-            keep.size,
-            lost,
-            float(np.median(radius / np.abs(g))),
-            float(np.median(error)),
-        )
-        if kind == "multisine" and not linear:
-            off = np.abs(20.0 * np.log10(np.abs(linearised(rig, seconds, f) / exact)))
-            rows["statistical linearisation"] = (0, keep.size, 0, np.nan, float(np.median(off)))
+        held = lines = lost = 0
+        radii, errors, off = [], [], []
+        for number in range(RECORDS):
+            record = rigs.record(rig, kind, seconds, noise=noise, seed=seed + 100 * number)
+            found = arbitrary_bla([run_of([record], rigs.RATE)], rigs.RATE)
+            bla = found.bla
+            keep = np.flatnonzero(bla.reliable)[::EVERY]
+            f, g, radius = bla.frequency_hz[keep], bla.g[keep], bla.radius_95[keep]
+            exact = truth.at(f)
+            held += int((np.abs(g - exact) <= radius).sum())
+            lines += keep.size
+            lost += int((found.left_out_hz < rigs.BAND_HZ[1]).sum())
+            radii.append(radius / np.abs(g))
+            errors.append(np.abs(20.0 * np.log10(np.abs(g / exact))))
+            if kind == "multisine" and not linear:
+                by_theory = linearised(rig, seconds, f)
+                off.append(np.abs(20.0 * np.log10(np.abs(by_theory / exact))))
+        radius, error = np.median(np.concatenate(radii)), np.nanmedian(np.concatenate(errors))
+        rows[kind] = (held, lines, lost, float(radius), float(error))
+        if off:
+            error = float(np.nanmedian(np.concatenate(off)))
+            rows["statistical linearisation"] = (0, lines, 0, np.nan, error)
     return rows
 
 
