@@ -89,7 +89,8 @@ def _swinging(view: SteadyView, nominal: Model, order: Order) -> Investigation:
         error = discretisation_error(view.recorded, whole.fitted.found.best.model.smooth)
         if np.max(error) <= DISCRETISATION_LIMIT:
             return whole
-    return _stopped(view, nominal)
+    found = _stopped(view, nominal)
+    return found if whole.diagnosis.causes else _beside_whole(found, whole)
 
 
 def _unsteady(view: SteadyView, nominal: Model, order: Order) -> Investigation:
@@ -103,13 +104,19 @@ def _unsteady(view: SteadyView, nominal: Model, order: Order) -> Investigation:
     gate = drift_gate(whole.fitted.fitter, whole.fitted.found.steps[0])
     gates = replace(view.gates, gates=(*view.gates.gates, gate))
     found = _stopped(replace(view, gates=gates), nominal)
-    told = found.diagnosis
     if drifts or not gate.passed:
         steadier = [g for g in gates.gates if g.passed or g.hint != "bad_data" or not g.of_periods]
         told = stopped("nonstationary", replace(gates, gates=tuple(steadier)))
+        found = replace(found, diagnosis=told)
+    return _beside_whole(found, whole)
+
+
+def _beside_whole(found: Investigation, whole: Investigation) -> Investigation:
+    """Return what a gate has stopped with what a search of whole runs has left."""
     seen = {name: getattr(whole.diagnosis, name) for name in ("gap", "steps", "evidence")}
-    notes = [*told.notes, NOTHING_NAMED, *whole.diagnosis.notes]
-    return replace(found, diagnosis=told.model_copy(update={**seen, "notes": notes}))
+    notes = [*found.diagnosis.notes, NOTHING_NAMED, *whole.diagnosis.notes]
+    told = found.diagnosis.model_copy(update={**seen, "notes": notes})
+    return replace(found, diagnosis=told)
 
 
 def _beside_drift(recorded: RecordedExperiment, order: Order) -> Investigation:

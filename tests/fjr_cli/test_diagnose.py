@@ -11,6 +11,7 @@ from gap_cases import simulate_case, write_bags
 from fjr_interface.parameter_file import save_parameter_file
 from fjr_sim_node.plant import PLANT
 from gap_diagnosis.outcome.diagnosis import Diagnosis
+from gap_diagnosis.steady_periods import NOTHING_NAMED
 
 SHORT = {"base_frequency_hz": 0.5, "transient_periods": 2, "levels_rad": (3e-3, 1e-2)}
 
@@ -124,6 +125,7 @@ def test_a_nominal_that_is_unstable_in_the_loop_is_bad_data(run, bags, tmp_path)
     diagnosis = Diagnosis.read(tmp_path / "out" / "diagnosis.json")
     assert diagnosis.verdict == "bad_data"
     assert any("nominal loop is not stable" in note for note in diagnosis.notes)
+    assert NOTHING_NAMED in diagnosis.notes and diagnosis.gap.refit is not None
 
 
 def test_ctrl_c_leaves_an_earlier_diagnosis_as_it_was(start_program, tmp_path):
