@@ -114,7 +114,8 @@ def _unsteady(view: SteadyView, nominal: Model, order: Order) -> Investigation:
 def _beside_whole(found: Investigation, whole: Investigation) -> Investigation:
     """Return what a gate has stopped with what a search of whole runs has left."""
     seen = {name: getattr(whole.diagnosis, name) for name in ("gap", "steps", "evidence")}
-    notes = [*found.diagnosis.notes, NOTHING_NAMED, *whole.diagnosis.notes]
+    said = [] if whole.diagnosis.causes else [NOTHING_NAMED]  # a drift alone is the verdict
+    notes = [*found.diagnosis.notes, *said, *whole.diagnosis.notes]
     told = found.diagnosis.model_copy(update={**seen, "notes": notes})
     return replace(found, diagnosis=told)
 

@@ -15,6 +15,7 @@ from fjr_records.periodic import read_experiment
 from fjr_sim_node.plant import PLANT
 from gap_diagnosis.any_record import investigate
 from gap_diagnosis.outcome.diagnosis import Diagnosis
+from gap_diagnosis.steady_periods import NOTHING_NAMED
 
 pytestmark = pytest.mark.slow
 
@@ -104,6 +105,7 @@ def test_a_rig_that_warms_up_is_nonstationary(run, tmp_path):
     _, diagnosis, text = diagnosed(run, tmp_path, effects)
     assert diagnosis.verdict == "nonstationary" and diagnosis.effects == []
     assert any("drifts within bags" in note for note in diagnosis.notes)
+    assert diagnosis.steps[-1].added == "nonstationary" and NOTHING_NAMED not in diagnosis.notes
     assert "The rig changes while it is recorded" in text
 
 
