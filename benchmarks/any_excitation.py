@@ -33,8 +33,11 @@ RECORDS = 3
 """Of each kind of every rig."""
 EVERY = 4
 """Every how many lines the truth is looked at."""
-Row = tuple[int, int, int, float, float]
-"""Lines held, reliable lines, lines left out, median radius over |G|, median error in dB."""
+LOW_HZ = 1.0
+"""Below, the response bends within one window."""
+Row = tuple[int, int, int, float, float, int, int]
+"""Lines held, reliable lines, lines left out, median radius over |G|, median error in dB; lines
+held and reliable lines below LOW_HZ."""
 
 
 def many_runs(rig: rigs.Rig, seconds: float) -> list[Run]:
@@ -84,7 +87,7 @@ def judged(seed: int, linear: bool, seconds: float, noise: float) -> dict[str, R
     truth = Truth(rig, seconds)
     rows: dict[str, Row] = {}
     for kind in KINDS:
-        held = lines = lost = 0
+        held = lines = lost = held_low = lines_low = 0
         radii, errors, off = [], [], []
         for number in range(RECORDS):
             record = rigs.record(rig, kind, seconds, noise=noise, seed=seed + 100 * number)
@@ -93,8 +96,9 @@ def judged(seed: int, linear: bool, seconds: float, noise: float) -> dict[str, R
             keep = np.flatnonzero(bla.reliable)[::EVERY]
             f, g, radius = bla.frequency_hz[keep], bla.g[keep], bla.radius_95[keep]
             exact = truth.at(f)
-            held += int((np.abs(g - exact) <= radius).sum())
-            lines += keep.size
+            inside, low = np.abs(g - exact) <= radius, f < LOW_HZ
+            held, lines = held + int(inside.sum()), lines + keep.size
+            held_low, lines_low = held_low + int(inside[low].sum()), lines_low + int(low.sum())
             lost += int((found.left_out_hz < rigs.BAND_HZ[1]).sum())
             radii.append(radius / np.abs(g))
             errors.append(np.abs(20.0 * np.log10(np.abs(g / exact))))
@@ -102,10 +106,10 @@ def judged(seed: int, linear: bool, seconds: float, noise: float) -> dict[str, R
                 by_theory = linearised(rig, seconds, f)
                 off.append(np.abs(20.0 * np.log10(np.abs(by_theory / exact))))
         radius, error = np.median(np.concatenate(radii)), np.nanmedian(np.concatenate(errors))
-        rows[kind] = (held, lines, lost, float(radius), float(error))
+        rows[kind] = (held, lines, lost, float(radius), float(error), held_low, lines_low)
         if off:
             error = float(np.nanmedian(np.concatenate(off)))
-            rows["statistical linearisation"] = (0, lines, 0, np.nan, error)
+            rows["statistical linearisation"] = (0, lines, 0, np.nan, error, 0, 0)
     return rows
 
 
@@ -133,7 +137,7 @@ def main() -> None:
     print(describe() + "\n", flush=True)
     rig_count = 8 if "--quick" in sys.argv else 20
     head = f"{'rig':8}{'s':>5}{'noise':>8}  {'excitation':26}{'discs hold':>14}{'lines':>7}"
-    print(head + f"{'left out':>10}{'radius':>9}{'error':>9}")
+    print(head + f"{'left out':>10}{'radius':>9}{'error':>9}  below {LOW_HZ:g} Hz")
     with ProcessPoolExecutor(2) as pool:
         for linear, seconds, noise in CASES:
             jobs = [pool.submit(judged, s, linear, seconds, noise) for s in range(rig_count)]
@@ -143,10 +147,11 @@ def main() -> None:
                 lines, lost = rows[:, 1:3].sum(axis=0)
                 cover = covered(rows[:, 0], rows[:, 1]) if kind in KINDS else ""
                 radius = f"{np.median(rows[:, 3]):.2%}" if kind in KINDS else ""
+                low = "{:.0f} of {:.0f}".format(*rows[:, 5:].sum(axis=0)) if kind in KINDS else ""
                 name = "linear" if linear else "friction"
                 print(
                     f"{name:8}{seconds:5.0f}{noise:8g}  {kind:26}{cover:>14}{lines:7.0f}"
-                    f"{lost:10.0f}{radius:>9}{np.nanmedian(rows[:, 4]):6.2f} dB",
+                    f"{lost:10.0f}{radius:>9}{np.nanmedian(rows[:, 4]):6.2f} dB  {low}",
                     flush=True,
                 )
         found = list(pool.map(trapezoid, range(rig_count)))
