@@ -12,7 +12,8 @@ from fjr_interface.experiment import Experiment, RecordDescription
 from fjr_records.importers.columns import Held, held_columns
 from fjr_records.importers.importer import Understood
 from fjr_records.importers.likely_columns import likely_map
-from fjr_records.importers.record_file import LEAST_SAMPLES, SYMBOLS, Record
+from fjr_records.importers.part import LEAST_SAMPLES
+from fjr_records.importers.record_file import SYMBOLS, Record
 from fjr_records.importers.repetition import Repetition
 
 _UNITS = {"reference": "rad", "torque": "N m", "position": "rad", "link": "rad"}
@@ -26,10 +27,12 @@ def held_by(path: Path) -> Iterator[str]:
     width = max((len(one.name) for one in columns), default=0)
     for one in columns:
         shape = " x ".join(map(str, one.shape))
+        if one.holes:
+            shape = f"{np.prod(one.shape) - one.holes} of {shape}"
         values = "not all finite real numbers"
         if one.range is not None:
             values = f"from {one.range[0]:.6g} to {one.range[1]:.6g}"
-        yield f"  {one.name:<{width}}  {shape:>10}  {values}"
+        yield f"  {one.name:<{width}}  {shape:>14}  {values}"
     if more:
         yield f"  and {more} more, not shown"
     likely = likely_map(_signals(columns))

@@ -50,7 +50,8 @@ def read_columns(
         names: the columns to read.
 
     Returns:
-        {name: float64 (samples,)}, and what the file says of each.
+        {name: float64 (samples,)}, and what the file says of each. Where most rows lack one of the
+        columns, as logs of several topics do, NaN stands for what a row does not hold.
 
     Raises:
         InputError: the file cannot be read, lacks a column (those that are there are named), or a
@@ -59,10 +60,30 @@ def read_columns(
     path = Path(path)
 
     def columns(found: Names) -> tuple[dict[str, np.ndarray], dict[str, Heading]]:
-        numbers = {name: _numbers(path, name, found.column(name)) for name in names}
-        return numbers, {name: found.headings.get(name, Heading(name)) for name in names}
+        headings = {name: found.headings.get(name, Heading(name)) for name in names}
+        try:
+            return {name: _numbers(path, name, found.column(name)) for name in names}, headings
+        except InputError:
+            parted = _parted_rows(found, names)
+            if parted is None:
+                raise
+            return parted, headings
 
     return _of_file(path, columns)
+
+
+def _parted_rows(found: Names, names: Sequence[str]) -> dict[str, np.ndarray] | None:
+    """Return columns with NaN for what a row does not hold, if most rows lack some; else None."""
+    path = found.path
+    try:
+        columns = {n: _numbers(path, n, found.column(n, holes=True), holes=True) for n in names}
+    except InputError:
+        return None
+    there = [np.isfinite(column) for column in columns.values()]
+    if len({each.size for each in there}) != 1 or not all(each.any() for each in there):
+        return None
+    whole = np.logical_and.reduce(there)
+    return columns if 2 * whole.sum() < whole.size else None
 
 
 @dataclass(frozen=True)
@@ -73,11 +94,13 @@ class Held:
         name: by which it is read.
         shape: of the array.
         range: least and greatest value; None where it does not hold finite real numbers.
+        holes: how many rows do not hold it.
     """
 
     name: str
     shape: tuple[int, ...]
     range: tuple[float, float] | None
+    holes: int = 0
 
 
 def held_columns(path: str | Path, most: int = 200) -> tuple[list[Held], int]:
@@ -98,12 +121,16 @@ def held_columns(path: str | Path, most: int = 200) -> tuple[list[Held], int]:
 
 def _held(name: str, found: Names) -> Held:
     try:
-        values = np.asarray(found.find(name))
+        values = found.column(name, holes=True)
     except InputError:  # a damaged column, or a name that is there twice: said when it is asked for
         return Held(name, (), None)
-    if values.dtype.kind not in "fiub" or not values.size or not np.isfinite(values).all():
+    if values.dtype.kind not in "fiub":
         return Held(name, values.shape, None)
-    return Held(name, values.shape, (float(values.min()), float(values.max())))
+    holes = np.isnan(values) & (found.find_with_holes is not None)
+    there = values[~holes]
+    if not there.size or not np.isfinite(there).all():
+        return Held(name, values.shape, None)
+    return Held(name, values.shape, (float(there.min()), float(there.max())), int(holes.sum()))
 
 
 def _of_file(path: Path, use: Callable[[Names], Result]) -> Result:
@@ -127,8 +154,11 @@ def _of_file(path: Path, use: Callable[[Names], Result]) -> Result:
         raise InputError(f"{path}: is nested too deeply to be a record.") from None
 
 
-def _numbers(path: Path, name: str, column: np.ndarray) -> np.ndarray:
-    """Return a column as float64 (samples,); raise InputError unless it is finite and real."""
+def _numbers(path: Path, name: str, column: np.ndarray, *, holes: bool = False) -> np.ndarray:
+    """Return a column as float64 (samples,); raise InputError unless it is finite and real.
+
+    With holes, it may be NaN as well.
+    """
     if column.dtype.kind not in "fiub":
         raise InputError(f"{path}: {name} does not hold real numbers; choose another column.")
     if column.ndim != 1 and sum(size != 1 for size in column.shape) > 1:
@@ -139,7 +169,7 @@ def _numbers(path: Path, name: str, column: np.ndarray) -> np.ndarray:
         )
     refuse_bomb(path, 8 * column.size)
     numbers = column.astype(float).ravel()
-    bad = np.flatnonzero(~(np.abs(numbers) <= LARGEST))
+    bad = np.flatnonzero(~(np.abs(numbers) <= LARGEST) & ~(holes & np.isnan(numbers)))
     if bad.size:
         raise InputError(
             f"{path}: {name} holds {numbers[bad[0]]} at sample {bad[0]} and {bad.size - 1} more "

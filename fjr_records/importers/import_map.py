@@ -25,9 +25,15 @@ UNITS: Mapping[str, Mapping[str, float]] = {
     "position": _ANGLE | _LENGTH | _TURNING | _SLIDING,
     "link": _ANGLE | _LENGTH | _TURNING | _SLIDING,
     "time": _TIME,
+    "reference_time": _TIME,
+    "torque_time": _TIME,
+    "position_time": _TIME,
+    "link_time": _TIME,
 }
 """Units of each quantity with their factors to rad, N m and s, or to m and N of a linear axis; the
 first is the default."""
+TIME, OWN_TIME = "time", "_time"
+"""The stamps of all signals, and the end of the name of those of a single one."""
 LINEAR = frozenset({*_LENGTH, *_FORCE, *_SLIDING})
 """Units of a linear axis."""
 SPEEDS = frozenset({*_TURNING, *_SLIDING})
@@ -110,7 +116,7 @@ class Column:
 
 
 def parse_map(specs: Sequence[str], *, described: bool = False) -> dict[str, Column]:
-    """Parse `quantity=[-]column[:unit]` for reference, torque, position, link and time.
+    """Parse `quantity=[-]column[:unit]` for reference, torque, position, link and their stamps.
 
     Args:
         specs: one for each quantity.
@@ -144,8 +150,17 @@ def parse_map(specs: Sequence[str], *, described: bool = False) -> dict[str, Col
                 "controller that made it (--controller)"
             )
         raise InputError(f"the map lacks {' and '.join(missing)}; add {missing[0]}=column{made}.")
+    for quantity in columns:
+        signal = quantity.removesuffix(OWN_TIME)
+        if signal not in columns:
+            raise InputError(f"the map has {quantity} but no {signal}; add {signal}=COLUMN.")
     refuse_both_axes("the map", columns)
     return columns
+
+
+def is_time(quantity: str) -> bool:
+    """Tell whether a quantity of a map is stamps, of all signals or of one."""
+    return quantity == TIME or quantity.endswith(OWN_TIME)
 
 
 def is_linear(columns: Mapping[str, Column]) -> bool:
@@ -160,7 +175,7 @@ def refuse_both_axes(source: str, columns: Mapping[str, Column]) -> None:
         source: what gives or states the units.
         columns: the column of each quantity.
     """
-    given = {q: c.unit for q, c in columns.items() if c.unit and q != "time"}
+    given = {q: c.unit for q, c in columns.items() if c.unit and not is_time(q)}
     linear = [f"{quantity} in {unit}" for quantity, unit in given.items() if unit in LINEAR]
     rotary = [f"{quantity} in {unit}" for quantity, unit in given.items() if unit not in LINEAR]
     if linear and rotary:

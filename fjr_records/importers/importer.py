@@ -82,9 +82,9 @@ def read_files(files: Sequence[str | Path], options: ImportOptions) -> Understoo
 
 def _grid_rate(samples: Sequence[Samples]) -> float | None:
     """Return the rate onto which all files are brought: the slowest, if one must be resampled."""
-    if all(each.timing.stamps_s is None for each in samples):
+    if not any(each.timing.stamps_s for each in samples):
         return None
-    even = [each.timing.rate_hz for each in samples if each.timing.stamps_s is None]
+    even = [each.timing.rate_hz for each in samples if not each.timing.stamps_s]
     return even[0] if even else min(each.timing.rate_hz for each in samples)
 
 

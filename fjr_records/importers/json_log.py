@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections.abc import Iterator
+from functools import partial
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -19,6 +21,8 @@ _BYTES_OF_A_NODE, _LEAST = 80, 2**28
 """What a value takes in memory once it is parsed, and what any file may take."""
 _BATCH = 1000
 """Lines that are parsed at once."""
+_SHOWING = 100
+"""Entries of a list that show which columns it has."""
 
 
 def open_json(path: Path) -> Names:
@@ -34,7 +38,11 @@ def open_json(path: Path) -> Names:
     if isinstance(content, dict) and not any(isinstance(v, (dict, list)) for v in content.values()):
         content = [content]  # one entry, alone on its line
     words = _known(content, words=True)
-    return Names(path, _known(content), lambda name: _column(path, content, name), words)
+
+    def find(name: str, *, holes: bool = False) -> np.ndarray:
+        return _column(path, content, name, holes=holes)
+
+    return Names(path, _known(content), find, words, find_with_holes=partial(find, holes=True))
 
 
 def _parse(path: Path, text: str) -> Any:
@@ -75,32 +83,44 @@ def _what(error: ValueError) -> str:
 
 
 def _known(content: Any, prefix: str = "", *, words: bool = False) -> list[str]:
-    """Return the paths of all columns, of words if asked, as the first entry of each list shows."""
+    """Return the paths of all columns, of words if asked, as the first entries of lists show."""
     if isinstance(content, dict):
-        inside = [
-            _known(value, f"{prefix}.{key}" if prefix else key, words=words)
-            for key, value in content.items()
-        ]
+        inside = [_known(value, _under(prefix, key), words=words) for key, value in content.items()]
         return [path for paths in inside for path in paths]
     if not isinstance(content, list) or not content:
         return []
-    if isinstance(content[0], dict):
-        return [
-            f"{prefix}.{key}" if prefix else key
-            for key, value in content[0].items()
-            if not isinstance(value, dict if words else (dict, str))
-        ] + [
-            path
-            for key, value in content[0].items()
-            if isinstance(value, dict)
-            for path in (f"{prefix}.{key}.{k}" if prefix else f"{key}.{k}" for k in value)
-        ]
-    return [prefix]
+    entries = [entry for entry in content[:_SHOWING] if isinstance(entry, dict)]
+    if not entries:
+        return [prefix]
+    fields: dict[str, None] = {}
+    for entry in entries:
+        fields |= dict.fromkeys(_fields(entry, prefix, words=words))
+    return list(fields)
 
 
-def _column(path: Path, content: Any, name: str) -> np.ndarray:
-    """Return the column of a path; every entry must have a number, or a row of them."""
-    values = list(_walk(path, content, name.split(".") if name else [], name))
+def _fields(entry: dict[str, Any], prefix: str, *, words: bool) -> list[str]:
+    """Return the paths of the fields of an entry, and of those inside them."""
+    found = []
+    for key, value in entry.items():
+        path = _under(prefix, key)
+        if isinstance(value, dict):
+            found += _fields(value, path, words=words)
+        elif words or not isinstance(value, str):
+            found.append(path)
+    return found
+
+
+def _under(prefix: str, key: str) -> str:
+    return f"{prefix}.{key}" if prefix else key
+
+
+def _column(path: Path, content: Any, name: str, *, holes: bool) -> np.ndarray:
+    """Return the column of a path; every entry must have a number, or a row of them.
+
+    With holes, an entry may have nothing, which is NaN.
+    """
+    keys = name.split(".") if name else []
+    values = list(_walk(path, content, keys, name, holes=holes))
     try:
         column = np.array(values[0] if len(values) == 1 else values)
     except ValueError:
@@ -113,12 +133,17 @@ def _column(path: Path, content: Any, name: str) -> np.ndarray:
     raise InputError(f"{path}: {name} does not hold real numbers; choose another column.")
 
 
-def _walk(path: Path, value: Any, keys: list[str], name: str, at: int = -1) -> Iterator[Any]:
-    """Yield the value at the end of the path, in each entry if a list is on the way."""
+def _walk(
+    path: Path, value: Any, keys: list[str], name: str, at: int = -1, *, holes: bool
+) -> Iterator[Any]:
+    """Yield the value at the end of the path, in each entry if a list is on the way.
+
+    With holes, an entry without a value yields NaN.
+    """
     for done in range(len(keys)):
         if isinstance(value, list):
             for number, entry in enumerate(value):
-                yield from _walk(path, entry, keys[done:], name, number)
+                yield from _walk(path, entry, keys[done:], name, number, holes=holes)
             return
         key = keys[done]
         rest = ".".join(keys[done:])
@@ -126,7 +151,10 @@ def _walk(path: Path, value: Any, keys: list[str], name: str, at: int = -1) -> I
             value = value[rest]
             break
         if not isinstance(value, dict) or key not in value:
+            if holes and at >= 0:
+                yield math.nan
+                return
             where = f"entry {at}" if at >= 0 else "the file"
             raise InputError(f"{path}: {where} has no {name}; repair or cut the record.")
         value = value[key]
-    yield value
+    yield math.nan if holes and value is None else value

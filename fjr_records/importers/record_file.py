@@ -13,17 +13,19 @@ from fjr_kit.errors import InputError
 
 from ..driven import wrong_sign
 from ..units import may_stick
-from . import coherence
+from . import coherence, part
 from .columns import read_columns
-from .import_map import Column, refuse_both_axes
+from .import_map import OWN_TIME, TIME, Column, is_time, refuse_both_axes
 from .integrals import DRIFTS, integrals
 from .made_torque import MADE, made_torque
+from .own_stamps import own_stamps
+from .part import LEAST_SAMPLES
 from .repetition import Repetition, find_repetition, insists
-from .stamps import LONGEST_S, Timing, read_timing, resample
+from .stamps import LONGEST_S
+from .timing import Timing, of_one_clock, of_own_clocks, resample
 from .wraps import without_wraps
 
 SYMBOLS = {"reference": "r", "torque": "u", "position": "y", "link": "q"}
-LEAST_SAMPLES = 16
 _HALF = 2**15
 
 
@@ -66,7 +68,7 @@ class Samples:
         path: the file.
         columns: where each quantity stands, in the unit that it was given or is stated in.
         values: {quantity: float64 (samples,)}, without time.
-        timing: what its time column says.
+        timing: when they were taken.
         notes: what was done to them.
         doubts: what is evidently wrong, but might be meant.
     """
@@ -88,7 +90,7 @@ class Record:
         columns: where each quantity stands, in the unit that it was given or is stated in.
         sample_rate_hz: rate of the grid.
         signals: {symbol: float64 (samples,)} in SI.
-        timing: what its time column says.
+        timing: when its samples were taken.
         repetition: its period, or a clause that says why there is none.
         notes: what was done to the signals.
         doubts: what is evidently wrong, but might be meant.
@@ -116,7 +118,7 @@ def read_samples(path: Path, options: ImportOptions) -> Samples:
     columns = {q: each.read_as(path, q, headings[each.name]) for q, each in given.items()}
     refuse_both_axes(f"{path}:", columns)
     unsigned = [
-        q for q, column in columns.items() if q != "time" and _lost_sign(arrays[column.name])
+        q for q, column in columns.items() if not is_time(q) and _lost_sign(arrays[column.name])
     ]
     for name in {columns[quantity].name for quantity in unsigned}:
         arrays[name] = np.where(arrays[name] >= _HALF, arrays[name] - 2 * _HALF, arrays[name])
@@ -125,36 +127,35 @@ def read_samples(path: Path, options: ImportOptions) -> Samples:
         for quantity in unsigned
     )
     values = {q: column.factor * arrays[column.name] for q, column in columns.items()}
-    speeds = {q: values.pop(q) for q, column in columns.items() if column.is_speed}
+    times = {q: values.pop(q) for q in columns if is_time(q)}
+    stamps: dict[str, np.ndarray] = {}
+    if set(times) - {TIME} or any(np.isnan(each).any() for each in values.values()):
+        values, stamps = own_stamps(path, values, times)
+    if len({id(each) for each in stamps.values()}) == 1:  # sampled together after all
+        times, stamps = {TIME: stamps["position"]}, {}
+    speeds = {q: values.pop(q) for q in list(values) if columns[q].is_speed}
     values, turns = without_wraps(values)
     values |= speeds
     notes += turns
-    size = values["position"].size
-    if options.repeat_reference and 0 < values.get("reference", np.empty(0)).size <= size:
-        values["reference"] = np.resize(values["reference"], size)
-    for quantity, each in values.items():
-        if each.size != size:
+    slow = {
+        q.removesuffix(OWN_TIME) for q, each in columns.items() if is_time(q) and each.by_factor
+    }
+    skip, keep, rate_hz = options.skip_samples, options.keep_samples, options.sample_rate_hz
+    if stamps:
+        if options.repeat_reference:
             raise InputError(
-                f"{path}: {columns[quantity].name} has {each.size} samples, but "
-                f"{columns['position'].name} has {size}; they must be of one length, or "
-                "--repeat-reference plays a single period of the reference again and again."
+                f"{path}: its signals have stamps of their own, so no reference can be repeated; "
+                "leave out --repeat-reference."
             )
-    first = options.skip_samples
-    last = size if options.keep_samples is None else first + options.keep_samples
-    values = {quantity: each[first:last] for quantity, each in values.items()}
-    left = values["position"].size
-    if not left:
-        raise InputError(f"{path}: no samples are left after {first} skipped ones.")
-    if left < LEAST_SAMPLES:
-        raise InputError(
-            f"{path}: {left} sample{'s are' if left > 1 else ' is'} too few for a record; give "
-            f"{LEAST_SAMPLES} or more."
-        )
-    meant = "time" in columns and columns["time"].by_factor
-    timing = read_timing(path, values.pop("time", None), options.sample_rate_hz, slow=meant)
-    if timing.kept is not None:
-        values = {quantity: each[timing.kept] for quantity, each in values.items()}
-    left = values["position"].size
+        values, stamps = part.of_time(path, values, stamps, skip, keep)
+        slow |= set(values) if TIME in slow else set()
+        values, timing = of_own_clocks(path, values, stamps, rate_hz, slow=slow)
+    else:
+        values = _of_one_length(path, values, columns, repeat=options.repeat_reference)
+        values = part.of_rows(path, values | times, skip, keep)
+        time = values.pop(TIME, None)
+        values, timing = of_one_clock(path, values, time, rate_hz, slow=TIME in slow)
+    left = min(each.size for each in values.values())
     if left < LEAST_SAMPLES or left > LONGEST_S * timing.rate_hz:
         raise InputError(
             f"{path}: {left} samples at {timing.rate_hz:g} Hz are no record; give at least "
@@ -164,8 +165,27 @@ def read_samples(path: Path, options: ImportOptions) -> Samples:
     return Samples(path, columns, values, timing, notes, tuple(doubt for doubt in said if doubt))
 
 
+def _of_one_length(
+    path: Path, values: dict[str, np.ndarray], columns: Mapping[str, Column], *, repeat: bool
+) -> dict[str, np.ndarray]:
+    """Return signals that were sampled together; raise InputError if one has another length."""
+    size = values["position"].size
+    if repeat and 0 < values.get("reference", np.empty(0)).size <= size:
+        values = {**values, "reference": np.resize(values["reference"], size)}
+    for quantity, each in values.items():
+        if each.size != size:
+            raise InputError(
+                f"{path}: {columns[quantity].name} has {each.size} samples, but "
+                f"{columns['position'].name} has {size}; they must be of one length, or "
+                "--repeat-reference plays a single period of the reference again and again, or "
+                f"{quantity}{OWN_TIME}=COLUMN maps stamps of its own."
+            )
+    return values
+
+
 def _lost_sign(column: np.ndarray) -> bool:
     """Tell whether whole numbers up to 65535 crowd at both ends, with nothing between."""
+    column = column[np.isfinite(column)]
     if column.size < 2 or column.min() < 0 or not _HALF <= column.max() < 2 * _HALF:
         return False
     between = (column > _HALF // 2) & (column < 3 * _HALF // 2)
@@ -185,7 +205,7 @@ def understand(
     """
     path, columns, timing, values = samples.path, samples.columns, samples.timing, samples.values
     notes = (*samples.notes, *timing.notes)
-    if timing.stamps_s is not None:
+    if timing.stamps_s:
         values, errors = resample(path, timing, values, rate_hz)
         notes += errors
     values, integrated = integrals(values, columns, rate_hz)

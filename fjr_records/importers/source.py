@@ -49,6 +49,8 @@ class Names:
         find: returns the array of a name.
         unlisted: names that `find` takes as well, but that no sentence lists.
         headings: of names that are not their own title, or of which more is said.
+        find_with_holes: returns it with NaN where a row or entry does not hold it; None where
+            `find` does.
     """
 
     path: Path
@@ -56,15 +58,20 @@ class Names:
     find: Callable[[str], Any]
     unlisted: Sequence[str] = ()
     headings: Mapping[str, Heading] = field(default_factory=dict)
+    find_with_holes: Callable[[str], Any] | None = None
 
-    def column(self, name: str) -> np.ndarray:
-        """Return the array `name`, or the signal i of a matrix for `name[i]`; raise InputError."""
+    def column(self, name: str, *, holes: bool = False) -> np.ndarray:
+        """Return the array `name`, or the signal i of a matrix for `name[i]`; raise InputError.
+
+        With holes, there may be NaN where a row or entry does not hold it.
+        """
+        find = (self.find_with_holes or self.find) if holes else self.find
         if name in self.known or name in self.unlisted:
-            return np.asarray(self.find(name))
+            return np.asarray(find(name))
         match = _INDEXED.fullmatch(name)
         if match is None or match["name"] not in self.known:
             raise self.missing(name if match is None else match["name"] or name)
-        matrix, index = np.asarray(self.find(match["name"])), int(match["index"])
+        matrix, index = np.asarray(find(match["name"])), int(match["index"])
         axis = sample_axis(matrix.shape)
         if matrix.ndim != 2 or index >= matrix.shape[1 - axis]:
             shape = " x ".join(map(str, matrix.shape))

@@ -1,21 +1,14 @@
-"""Time columns: even, coarse, jittered or wild, and the signals on one even grid.
+"""What one time column says: even, coarse, jittered or wild stamps.
 
-Stamps that lie on a straight line up to their own resolution are even ones that were rounded. Those
-of a jittered clock are resampled as the signals of a bag are. Where no clock can be followed at
-all, signals are joined by straight lines. The error is stated either way.
+Stamps that lie on a straight line up to their own resolution are even ones that were rounded.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 
-from fjr_interface.resampling.accuracy import LEAST_SAMPLES, Survey
-from fjr_interface.resampling.grid_stream import Grid, GridStream
 from fjr_kit.errors import InputError
 
 FASTEST_HZ = 1e6
@@ -30,18 +23,13 @@ FEW = 0.01
 """... if such steps are at most this part of all: else they are how the logger works."""
 UNEVEN = 0.01
 """Greatest deviation of one time step from the mean one, relative to it, of even stamps."""
-GREATEST_ERROR = 0.2
-"""Greatest rms error of the position by straight lines, relative to its rms."""
-MOST_SAMPLES = 16
-"""Most samples of the grid for each sample of the file."""
-_PIECE = 4096
 _GAP = 1.5
 _ROUNDING = 0.75
 """Greatest distance of rounded stamps from a straight line, in units of their last digit."""
 
 
 @dataclass(frozen=True)
-class Timing:
+class Clock:
     """What a time column says.
 
     Attributes:
@@ -61,14 +49,14 @@ class Timing:
     kept: np.ndarray | None = None
 
 
-def read_timing(
-    path: Path, time: np.ndarray | None, given_hz: float | None, *, slow: bool = False
-) -> Timing:
-    """Understand the time column of a file.
+def read_clock(
+    source: str, time: np.ndarray | None, given_hz: float | None, *, slow: bool = False
+) -> Clock:
+    """Understand a time column of a file.
 
     Args:
-        path: the file.
-        time: its time column in s, (samples,); None without one.
+        source: the file, and the time column if there are several, for sentences.
+        time: the time column in s, (samples,); None without one.
         given_hz: sample rate that the user gave.
         slow: whether it may be slower than SLOWEST_HZ.
 
@@ -78,46 +66,47 @@ def read_timing(
     if time is None:
         if given_hz is None or not 0 < given_hz <= FASTEST_HZ:
             raise InputError(
-                f"{path}: give a sample rate of up to {FASTEST_HZ:g} Hz, or map a time column."
+                f"{source}: give a sample rate of up to {FASTEST_HZ:g} Hz, or map a time column."
             )
-        return Timing(None, given_hz)
+        return Clock(None, given_hz)
     if time.size < 2 or not time[-1] > time[0]:
-        raise InputError(f"{path}: the time column does not increase; map another column.")
+        raise InputError(f"{source}: the time column does not increase; map another column.")
     step, steps = (time[-1] - time[0]) / (time.size - 1), np.diff(time)
     falling = np.flatnonzero(steps < 0)
     if falling.size:
         at = int(falling[0])
         raise InputError(
-            f"{path}: the time column goes back from {time[at]:g} to {time[at + 1]:g} s after "
+            f"{source}: the time column goes back from {time[at]:g} to {time[at + 1]:g} s after "
             f"sample {at}; map another column, or cut the record there."
         )
     if step * FASTEST_HZ < 1.0:
         raise InputError(
-            f"{path}: the time column goes on by {step:g} s, more than {FASTEST_HZ:g} samples in a "
-            "second; correct its unit."
+            f"{source}: the time column goes on by {step:g} s, more than {FASTEST_HZ:g} samples in "
+            "a second; correct its unit."
         )
-    _refuse_slow(path, time, slow)
+    _refuse_slow(source, time, slow)
     stretch = _longest_stretch(steps)
     if stretch is not None:
-        return _of_stretch(path, time, given_hz, stretch, slow)
+        return _of_stretch(source, time, given_hz, stretch, slow)
     if (np.abs(steps - step) <= UNEVEN * step).all():
-        return Timing(None, _same(path, _whole(1.0 / step, 1e-6), given_hz))
+        return Clock(None, _same(source, _whole(1.0 / step, 1e-6), given_hz))
     rounded = _rounded_rate(time)
     if rounded is not None:
         rate, digit = rounded
         note = f"its stamps are rounded to {digit:g} s and taken as even, {rate:.6g} samples/s"
-        return Timing(None, _same(path, rate, given_hz), notes=(note,))
-    return _uneven(path, time, given_hz)
+        return Clock(None, _same(source, rate, given_hz), notes=(note,))
+    return _uneven(source, time, given_hz)
 
 
-def _refuse_slow(path: Path, time: np.ndarray, slow: bool) -> None:
+def _refuse_slow(source: str, time: np.ndarray, slow: bool) -> None:
     """Raise InputError if the time column is evidently not in s."""
     span, steps = time[-1] - time[0], np.diff(time)
     usual = float(np.median(steps))
     if span > LONGEST_S or (usual > 1.0 / SLOWEST_HZ and not slow):
         raise InputError(
-            f"{path}: the time column goes on by {usual:g} s from sample to sample, as if it were "
-            "in ms, us or ns and taken for s; give its unit, as in time=COLUMN:ms, or a factor."
+            f"{source}: the time column goes on by {usual:g} s from sample to sample, as if it "
+            "were in ms, us or ns and taken for s; give its unit, as in time=COLUMN:ms, or a "
+            "factor."
         )
 
 
@@ -133,10 +122,10 @@ def _longest_stretch(steps: np.ndarray) -> slice | None:
 
 
 def _of_stretch(
-    path: Path, time: np.ndarray, given_hz: float | None, stretch: slice, slow: bool
-) -> Timing:
+    source: str, time: np.ndarray, given_hz: float | None, stretch: slice, slow: bool
+) -> Clock:
     """Return the timing of one stretch of a file, which is kept alone."""
-    of_stretch = read_timing(path, time[stretch], given_hz, slow=slow)
+    of_stretch = read_clock(source, time[stretch], given_hz, slow=slow)
     steps = np.diff(time)
     gaps = steps[steps > LONG_GAP * np.median(steps[steps > 0])]
     kept = np.arange(time.size)[stretch]
@@ -156,31 +145,29 @@ def _of_stretch(
     )
 
 
-def _uneven(path: Path, time: np.ndarray, given_hz: float | None) -> Timing:
+def _uneven(source: str, time: np.ndarray, given_hz: float | None) -> Clock:
     kept = np.concatenate([[True], np.diff(time) > 0])
     notes: tuple[str, ...] = ()
     if not kept.all():
         notes = (f"{np.sum(~kept)} samples repeat the stamp before them and are left out",)
     stamps = time[kept]
     if stamps.size < 3:
-        raise InputError(f"{path}: the time column has {stamps.size} different stamps; too few.")
+        raise InputError(f"{source}: the time column has {stamps.size} different stamps; too few.")
     steps = np.diff(stamps)
     usual = float(np.median(steps))
     gaps = steps[steps > _GAP * usual]
     rate = given_hz or _three_digits((stamps.size - 1) / (stamps[-1] - stamps[0]))
-    return Timing(
-        stamps, rate, gaps.size, float(gaps.max(initial=0.0)), notes, np.flatnonzero(kept)
-    )
+    return Clock(stamps, rate, gaps.size, float(gaps.max(initial=0.0)), notes, np.flatnonzero(kept))
 
 
 def _three_digits(rate: float) -> float:
     return float(f"{rate:.3g}")
 
 
-def _same(path: Path, rate: float, given: float | None) -> float:
+def _same(source: str, rate: float, given: float | None) -> float:
     if given is not None and abs(rate - given) > 1e-4 * given:
         raise InputError(
-            f"{path}: the time column says {rate:g} Hz, not {given:g} Hz; leave one of them out."
+            f"{source}: the time column says {rate:g} Hz, not {given:g} Hz; leave one of them out."
         )
     return float(given or rate)
 
@@ -204,86 +191,3 @@ def _rounded_rate(time: np.ndarray) -> tuple[float, float] | None:
 def _multiples(time: np.ndarray, digit: float) -> bool:
     counts = time / digit
     return bool((np.abs(counts - np.rint(counts)) < 1e-4).all())
-
-
-def resample(
-    path: Path, timing: Timing, signals: Mapping[str, np.ndarray], rate_hz: float
-) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
-    """Bring unevenly sampled signals onto a grid.
-
-    Args:
-        path: the file.
-        timing: its time column, uneven.
-        signals: {name in `Record`: float64 (samples,)}.
-        rate_hz: of the grid.
-
-    Returns:
-        The signals on the grid, and sentences on the error of each.
-
-    Raises:
-        InputError: they cannot be brought there faithfully.
-    """
-    stamps = timing.stamps_s
-    assert stamps is not None
-    if (stamps[-1] - stamps[0]) * rate_hz > MOST_SAMPLES * stamps.size + LEAST_SAMPLES:
-        raise InputError(
-            f"{path}: {stamps.size} samples in {stamps[-1] - stamps[0]:g} s are too few for "
-            f"{rate_hz:g} Hz; give a lower sample rate."
-        )
-    try:
-        return _as_bags_are(path, stamps, signals, rate_hz)
-    except InputError as why:
-        return _by_lines(path, stamps, signals, rate_hz, str(why))
-
-
-def _as_bags_are(
-    path: Path, stamps_s: np.ndarray, signals: Mapping[str, np.ndarray], rate_hz: float
-) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
-    stamps = np.rint((stamps_s - stamps_s[0]) * 1e9).astype(np.int64)
-    pieces = [slice(at, at + _PIECE) for at in range(0, stamps.size, _PIECE)]
-    out, sentences = {}, []
-    for name, values in signals.items():
-        survey = Survey(str(path), name, name)
-        for piece in pieces:
-            survey.add(stamps[piece], values[piece])
-        found = survey.finish()
-        last = math.floor((found.last_ns - found.first_ns) * 1e-9 * rate_hz + 1e-6)
-        stream = GridStream(found, Grid(0, rate_hz, 0, last))
-        for piece in pieces:
-            stream.add(stamps[piece], values[piece])
-        stream.finish()
-        out[name] = stream.take(last + 1)
-        named = replace(found, topic="uneven stamps")
-        sentences.append(named.sentence.rstrip("."))
-    return out, tuple(sentences)
-
-
-def _by_lines(
-    path: Path,
-    stamps: np.ndarray,
-    signals: Mapping[str, np.ndarray],
-    rate_hz: float,
-    why: str,
-) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
-    """Join the samples by straight lines; each sample left out in turn shows the error."""
-    grid = (
-        stamps[0] + np.arange(math.floor((stamps[-1] - stamps[0]) * rate_hz + 1e-6) + 1) / rate_hz
-    )
-    before, here, after = stamps[:-2], stamps[1:-1], stamps[2:]
-    share = (here - before) / (after - before)
-    out, errors = {}, []
-    for name, values in signals.items():
-        left_out = values[:-2] + share * (values[2:] - values[:-2]) - values[1:-1]
-        error, rms = float(np.sqrt(np.mean(left_out**2))), float(np.std(values))
-        relative = error / rms if rms else 0.0
-        if name == "position" and relative > GREATEST_ERROR:
-            raise InputError(
-                f"{why.rstrip('.')}; nor do straight lines between the samples do: their error is "
-                f"{relative:.0%} of the position's rms."
-            )
-        out[name] = np.interp(grid, stamps, values)
-        errors.append(f"{name} {relative:.2g}")
-    return out, (
-        "its stamps follow no clock, so the samples are joined by straight lines; a sample that is "
-        f"left out is met to this part of the signal's rms: {', '.join(errors)}",
-    )

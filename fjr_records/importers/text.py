@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import csv
+import math
 import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -124,21 +126,26 @@ def open_text(path: Path) -> Names:
     places = {name: at for at, name in reversed(list(enumerate(names)))}
     numbers = [each for at in range(len(names)) for each in (str(at), f"[{at}]")]
     stamps = _stamps(layout, text, start)
+    origin = next(iter(stamps.values()), "")
     units = ["s" if at in stamps else "".join(units[at : at + 1]) for at in range(len(names))]
     titled = [Heading(name, unit) for name, unit in zip(names, units, strict=True)]
     headings = {number: titled[int(number.strip("[]"))] for number in numbers}
     headings |= {name: titled[at] for name, at in places.items()}
 
-    def find(name: str) -> np.ndarray:
-        if names.count(name) > 1:
+    twice = {name for name in names if names.count(name) > 1}
+    listed = [str(at) if name in twice else name for at, name in enumerate(names)]
+
+    def find(name: str, *, holes: bool = False) -> np.ndarray:
+        if name in twice:
             raise InputError(
                 f"{path}: the column {name} is there {names.count(name)} times; rename one, or "
                 "name it by its number, counted from 0."
             )
         index = places[name] if name in places else int(name.strip("[]"))
-        return _column(path, layout, text, start, index, len(names), name)
+        columns = len(names)
+        return _column(path, layout, text, start, index, columns, name, origin=origin, holes=holes)
 
-    return Names(path, names, find, numbers, headings)
+    return Names(path, listed, find, [*numbers, *twice], headings, partial(find, holes=True))
 
 
 def _lines(text: str, most: int | None = None) -> Iterator[tuple[int, str]]:
@@ -190,19 +197,31 @@ def _start(grid: _Grid, text: str) -> tuple[int, list[str], list[str]]:
     return _NOWHERE, above[0][1] if above else [], []
 
 
-def _stamps(layout: _Layout, text: str, start: int) -> list[int]:
-    """Return which columns of the first line of numbers hold stamps of calendar and clock."""
+def _stamps(layout: _Layout, text: str, start: int) -> dict[int, str]:
+    """Return the stamps of calendar and clock in the first line of numbers, by their columns."""
     for number, line in _lines(text):
         if number >= start and not _is_comment(line):
-            return [at for at, cell in enumerate(layout.cells(line)) if is_stamp(cell)]
-    return []
+            return {at: cell for at, cell in enumerate(layout.cells(line)) if is_stamp(cell)}
+    return {}
 
 
 def _column(
-    path: Path, layout: _Layout, text: str, start: int, index: int, columns: int, name: str
+    path: Path,
+    layout: _Layout,
+    text: str,
+    start: int,
+    index: int,
+    columns: int,
+    name: str,
+    *,
+    origin: str,
+    holes: bool,
 ) -> np.ndarray:
-    """Return one column, stamps in s from the first; raise InputError that names the line."""
-    values: list[float] = []
+    """Return one column, stamps in s from the origin; raise InputError that names the line.
+
+    With holes, an empty cell is NaN.
+    """
+    values, begun = list[float](), False
     read: Callable[[str], float] = layout.value
     kind = "number"
     for number, line in _lines(text):
@@ -216,9 +235,13 @@ def _column(
                 f"{path}: line {number} has {len(cells)} columns, not {columns}; repair or cut it."
             )
         cell = cells[index]
+        if holes and not cell:
+            values.append(math.nan)
+            continue
         try:
-            if not values and is_stamp(cell):
-                read, kind = since(cell), "stamp of calendar and clock"
+            if not begun and is_stamp(cell):
+                read, kind = since(origin or cell), "stamp of calendar and clock"
+            begun = True
             values.append(read(cell))
         except ValueError:
             raise InputError(
