@@ -70,7 +70,7 @@ lint: $(INSTALLED) ## check style and types
 	$(BIN)/mypy
 
 lock: ## compile both lock files anew (needs uv)
-	@extras=(--extra={report,dask,dev,docs,bench,export,rivals})
+	@extras=(--extra={report,dask,dev,docs,bench,export,rivals,hdf5})
 	compile() { uv pip compile --quiet --universal --no-strip-extras --generate-hashes --custom-compile-command 'make lock' pyproject.toml - "$${extras[@]}" "$$@"; }
 	echo 'setuptools>=77' | compile --python-version 3.10 --extra ros --output-file requirements.lock
 	printf '%s\n' 'setuptools>=77' 'numpy<2' | compile --python-version 3.12 --output-file requirements-installed-ros.lock
