@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import gzip
+import importlib
 import json
 from datetime import datetime, timedelta
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -328,6 +330,11 @@ def _whole(suffix: str, folder) -> bytes:
         np.savez_compressed(file, r=R, y=Y)
     elif suffix == ".npy":
         np.save(file, np.rec.fromarrays([R, Y], names="r,y"))
+    elif suffix in (".h5", ".hdf5") and find_spec("h5py"):
+        h5py = importlib.import_module("h5py")
+        with h5py.File(file, "w") as stored:
+            stored["r"], stored["y"] = R, Y
+            stored.create_dataset("m", data=np.stack([R, Y]), compression="gzip")
     elif suffix in (".json", ".jsonl", ".ndjson"):
         file.write_text(json.dumps([{"r": r, "y": y} for _, r, y in ROWS]))
     else:
