@@ -22,6 +22,7 @@ from ..model.rig_model import Model
 from .comparison import NOTHING_LEFT, CellFit, Comparison
 from .from_parts import from_part
 from .least_squares import solve
+from .other_splits import other_splits
 from .ripples import Ripples
 from .ripples_passed import fewest_cycles
 from .scales import Scales
@@ -199,12 +200,25 @@ class CellFitter(Comparison):
         Weighed by what itself leaves, a fit may stay where it misses much in a cell, which then
         counts for little. So it is also begun with the weights of noise, and the better one counts.
         """
-        fit = self._while_it_falls(fit)
+        fit = self._of_other_split(self._while_it_falls(fit))
         if not self.left_in_a_band(fit) > NOTHING_LEFT:
             return fit
         noise = self.weights.floor
         other = self._reweighted(fit.effects, fit.space, fit.solution.x, noise, _REFIT_ROUNDS)
         return replace(other, acts=fit.acts) if self.gains(other, fit).sum() > 0.0 else fit
+
+    def _of_other_split(self, fit: CellFit) -> CellFit:
+        """Return a fit, or a better one with another share of inertia behind the transmission."""
+        best = fit
+        if not self.left_in_a_band(fit) > NOTHING_LEFT:
+            return best
+        for effects in other_splits(fit.model.effects):
+            start = fit.space.point(Model(fit.model.plant, effects))
+            start = np.clip(start, *fit.space.bounds())
+            other = replace(self._begun(fit.effects, fit.space, start), acts=fit.acts)
+            if self.gains(other, best).sum() > 0.0:
+                best = self._while_it_falls(other)
+        return best
 
     def _while_it_falls(self, fit: CellFit) -> CellFit:
         for _ in range(_FURTHER):
