@@ -29,7 +29,7 @@ from .outcome.verdict_words import OUT_OF_TIME, ROUNDING
 from .verdict.coarse_encoder import with_coarse_encoder
 from .verdict.judgement import judge
 from .verdict.kept_causes import kept
-from .verdict.notes import at_limits
+from .verdict.notes import at_limits, yielding
 from .verdict.tested_causes import Tested
 from .which.catalogue import catalogue
 from .which.cell_fits import DRIFT, CellFitter
@@ -198,6 +198,7 @@ def investigate_runs(
     if (tested or not names) and _misses(fitter, found.best) >= 1.0:
         found, tested = replace(found, steps=found.steps[:1]), []
         heard.append(LOST)
+    heard += yielding([t.effect for t in tested], fitter.misfit(found.best))
     progress("what may stand in for a cause")
     tied = {t.effect: _tied(fitter, found, t, names) for t in tested}
     alternatives = {effect: [fit.effects[-1] for fit in fits] for effect, fits in tied.items()}

@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ..outcome.verdict_words import ROUNDING
+from ..which.comparison import NOTHING_LEFT
+from ..which.other_splits import YIELDS
 from ..which.search_space import Space
 
 SCALED = "A torque-constant error is equivalent to scaling all parameters."
@@ -31,6 +33,22 @@ def rounding(
         f"its rms, {rest} leaves {left:.2%}: {misfits[0]:.3g} times what noise explains, "
         f"{misfits[1]:.3g} times what noise and rounding explain."
     )
+
+
+def yielding(effects: Sequence[str], misfit: float) -> list[str]:
+    """Return what to do next where a transmission yields that the datasheet has rigid.
+
+    Args:
+        effects: that are named.
+        misfit: that they leave, per degree of freedom; NaN where noise is not known.
+    """
+    if YIELDS not in effects or misfit < NOTHING_LEFT:
+        return []
+    return [
+        "A transmission that yields may have backlash, hysteresis or damping, for which a rigid "
+        "datasheet has no place: the same command with --nominal updated.yaml (and another --out) "
+        "looks for them beside what was found."
+    ]
 
 
 def beyond_tolerance(

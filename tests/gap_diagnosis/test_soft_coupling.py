@@ -16,6 +16,7 @@ from fjr_records.records import Record, RecordSet
 from gap_diagnosis.any_record import investigate
 from gap_diagnosis.investigation import Investigation
 from gap_diagnosis.model.nominal import datasheet
+from gap_diagnosis.verdict.notes import yielding
 from gap_diagnosis.which.other_splits import other_splits
 
 RATE, SECONDS, SUBSTEPS = 500, 20, 20
@@ -67,6 +68,14 @@ def test_stiffness_and_inertia_of_the_disc_are_found_however_the_fit_begins(foun
     share = DISC / (MOTOR + DISC)
     assert sizes[f"{of}.link_inertia_share"].value == pytest.approx(share, rel=0.05)
     assert sizes["viscous_friction.motor_nm_s_rad"].value == pytest.approx(VISCOUS, rel=0.05)
+
+
+def test_what_a_yielding_transmission_may_have_besides_is_a_question_of_its_own():
+    named = ["coulomb_friction", "transmission_stiffness"]
+    (note,) = yielding(named, 20.0)
+    assert "--nominal updated.yaml" in note
+    assert yielding(named, math.nan) == [note]
+    assert yielding(named, 1.1) == yielding(named[:1], 20.0) == []
 
 
 def test_other_splits_are_alike_at_low_frequencies():
