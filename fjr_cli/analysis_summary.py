@@ -9,6 +9,7 @@ from rich.console import Console
 from bla_analyzer.results.findings import between_levels, findings
 from bla_analyzer.results.result import Result
 from bla_analyzer.results.summary import campaign, failed_checks, headline, summarize
+from fjr_kit.number_text import formatted
 from fjr_kit.terminal import print_table
 
 
@@ -54,4 +55,4 @@ def _table(result: Result) -> tuple[list[tuple[str, str]], list[list[str]]]:
 
 
 def _cell(value: float, form: str) -> str:
-    return "-" if math.isnan(value) else f"{value:{form}}"
+    return "-" if math.isnan(value) else formatted(value, form)

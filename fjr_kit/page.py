@@ -18,7 +18,7 @@ from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 from plotly.offline import get_plotlyjs
 
 from .check import Check
-from .number_text import unsigned_zero
+from .number_text import formatted, unsigned_zero
 
 SENTENCE = 40
 """A cell that is longer than this many characters is a sentence."""
@@ -109,7 +109,7 @@ def number(value: float, form: str) -> str:
     """Return a number as a page shows it: with a minus sign, a dash where it is not finite."""
     if not isfinite(value):
         return "\N{EN DASH}"
-    return unsigned_zero(format(value, form)).replace("-", "\N{MINUS SIGN}")
+    return unsigned_zero(formatted(value, form)).replace("-", "\N{MINUS SIGN}")
 
 
 def narrow_form(rows: Sequence[Row]) -> str:
