@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -24,13 +24,11 @@ from controller_node.transfer_function import TransferFunction
 from fjr_kit.errors import InputError
 
 from .controller_check import clamp_nm
+from .gain_search import TIMES, begins, best_point, bounds, solved_linearly, values_at
 
 _LIMIT = "torque_limit_nm"
 _CURVED = {"n", "velocity_filter_rad_s", "integral_time_s"}
-_TIMES = {"k_position": "k_velocity", "setpoint_weight": "p"}  # a gain, and by which it multiplies
-_TRIALS = 7  # values of each searched gain at which the search may begin
-_MOST_SEARCHED = 2
-_BEGIN = 2
+_MOST_CURVED = 2
 _TIGHT = {"xtol": 1e-14, "ftol": 1e-14, "gtol": 1e-14}
 _STEP = 1e-5
 _BEYOND = 3.0
@@ -109,6 +107,11 @@ class _Record:
     y: np.ndarray
     free: np.ndarray
 
+    @property
+    def measured(self) -> np.ndarray:
+        """Torque where it is not clamped, (F,)."""
+        return self.u[self.free]
+
     def thinned(self) -> _Record:
         """Return the record with few enough free samples for a search."""
         every = 1 + self.free.size // _SEARCH_SAMPLES
@@ -158,82 +161,46 @@ class _Record:
 def _solved(record: _Record, gains: Sequence[FreeGain]) -> IdentifiedGains:
     """Return all gains but a torque limit."""
     names = {gain.name for gain in gains}
-    searched = [g for g in gains if g.name in _CURVED or _TIMES.get(g.name) in names]
+    searched = [g for g in gains if g.name in _CURVED or TIMES.get(g.name) in names]
     at = {gain.name for gain in searched}
     linear = [g.name for g in gains if g.name not in at and g.name != _LIMIT]
-    if len(searched) > _MOST_SEARCHED:
+    curved = sorted(name for name in at & _CURVED if TIMES.get(name) not in linear)
+    if len(curved) > _MOST_CURVED:
         raise InputError(
-            f"{', '.join(sorted(at))} cannot all be told from one torque; give values for all but "
-            f"{_MOST_SEARCHED}."
+            f"{', '.join(curved)} cannot all be told from one torque; give values for all but "
+            f"{_MOST_CURVED}."
         )
-    measured = record.u[record.free]
+    measured = record.measured
 
     def model(
         point: np.ndarray, weights: np.ndarray | None = None, of: _Record = record
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the modelled torque, its columns and their weights at values of the search."""
-        columns, offset = of.equations(linear, _values(searched, point))
+        columns, offset = of.equations(linear, values_at(searched, point))
         if weights is None:
-            weights = _least_squares(columns, of.u[of.free] - offset)
+            weights = solved_linearly(columns, of.measured - offset)
         weights = np.pad(weights, (0, max(columns.shape[1] - weights.size, 0)))
         return columns @ weights[: columns.shape[1]] + offset, columns, weights
 
     def errors(point: np.ndarray, of: _Record = record) -> np.ndarray:
-        return (model(point, of=of)[0] - of.u[of.free]) / np.std(measured)
+        return (model(point, of=of)[0] - of.measured) / np.std(measured)
 
     point = np.zeros(0)
     if searched:
-        point = _searched(partial(errors, of=record.thinned()), searched)
-        point = least_squares(errors, point, bounds=_bounds(searched), **_TIGHT).x
+        thinned = record.thinned()
+        points = begins(thinned, searched, linear)
+        point = best_point(partial(errors, of=thinned), searched, points)
+        point = least_squares(errors, point, bounds=bounds(searched), **_TIGHT).x
     torque, columns, weights = model(point)
     slopes = [(model(point + h, weights)[0] - torque) / h.sum() for h in _STEP * np.eye(point.size)]
     deviations = _standard_errors(np.column_stack([*slopes, columns]), measured - torque)
     # Searched on a logarithm, the error is one of the logarithm.
-    values = _values(searched, point)
+    values = values_at(searched, point)
     units = [values[gain.name] if gain.logarithmic else 1.0 for gain in searched]
     deviations[: len(units)] *= units
     found = {**values, **dict(zip(linear, weights.tolist(), strict=False))}
     explained = 1.0 - float(np.var(measured - torque) / np.var(measured))
     return IdentifiedGains(found, dict(zip(found, deviations.tolist(), strict=False)), explained)
-
-
-def _searched(
-    errors: Callable[[np.ndarray], np.ndarray], searched: Sequence[FreeGain]
-) -> np.ndarray:
-    """Return the point that fits best, begun at the best points of a grid."""
-    low, high = _bounds(searched)
-    inner = np.linspace(0.0, 1.0, _TRIALS + 2)[1:-1]
-    grid = [low + np.array(p) * (high - low) for p in itertools.product(inner, repeat=low.size)]
-    trials = sorted(grid, key=lambda point: _sum_of_squares(errors(point)))
-    fits = [least_squares(errors, point, bounds=(low, high)) for point in trials[:_BEGIN]]
-    return min(fits, key=lambda fit: fit.cost).x
-
-
-def _bounds(searched: Sequence[FreeGain]) -> tuple[np.ndarray, np.ndarray]:
-    low = np.array([_on_scale(gain, gain.low) for gain in searched])
-    return low, np.array([_on_scale(gain, gain.high) for gain in searched])
-
-
-def _sum_of_squares(errors: np.ndarray) -> float:
-    return float(errors @ errors)
-
-
-def _on_scale(gain: FreeGain, value: float) -> float:
-    return math.log(value) if gain.logarithmic else value
-
-
-def _values(gains: Sequence[FreeGain], point: np.ndarray) -> dict[str, float]:
-    return {
-        gain.name: math.exp(at) if gain.logarithmic else float(at)
-        for gain, at in zip(gains, point, strict=True)
-    }
-
-
-def _least_squares(columns: np.ndarray, target: np.ndarray) -> np.ndarray:
-    """Return the least-squares solution, columns of any size."""
-    size = np.linalg.norm(columns, axis=0)
-    size[size == 0.0] = 1.0
-    return np.linalg.lstsq(columns / size, target, rcond=None)[0] / size
 
 
 def _standard_errors(jacobian: np.ndarray, left: np.ndarray) -> np.ndarray:

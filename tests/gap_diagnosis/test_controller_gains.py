@@ -85,6 +85,41 @@ def test_gains_are_solved_exactly_from_a_noise_free_record(known, names):
     assert check_law(law, r, y, u).passed
 
 
+def moves(rng: np.random.Generator, samples: int) -> np.ndarray:
+    """A reference that goes from place to place by trapezoids of speed, with rests between."""
+    way = [0.0]
+    while len(way) < samples:
+        goal, n = rng.uniform(-3.0, 3.0), int(RATE * rng.uniform(0.4, 1.5))
+        t = np.arange(1, n + 1) / n
+        speed = np.minimum(np.minimum(t, 1.0 - t), 1.0 / 3.0)
+        way += [*(way[-1] + (goal - way[-1]) * np.cumsum(speed) / speed.sum()), *[goal] * 200]
+    return np.array(way[:samples])
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("filtered", [False, True])
+def test_all_gains_of_a_servo_are_solved_from_moves_of_its_axis(seed, filtered):
+    rng = np.random.default_rng(seed)
+    values = {
+        "k_position": rng.uniform(5.0, 25.0),
+        "k_velocity": rng.uniform(8.0, 30.0),
+        "integral_time_s": np.exp(rng.uniform(np.log(0.05), np.log(0.5))),
+    }
+    if filtered:
+        values["velocity_filter_rad_s"] = rng.uniform(200.0, 900.0)
+    axis = {**plant.PLANT.defaults(), "fs": 0.0, "fsm": 1.5, "k0": 4e4, "k1": 0.0}
+    law = law_of({"kind": "p_pi", **values}, RATE)
+    run = closed_loop.simulate(moves(rng, 12_000), RATE, plant.coefficients(axis), law)
+    noise = 0.01 * np.std(run.torque) * rng.standard_normal(run.torque.size)
+    description, _ = freed({"kind": "p_pi", **values}, *values)
+    begun = slice(300, None)
+    r, u, y = run.reference, run.torque + noise, run.position
+    found = identify_gains(description, r[begun], u[begun], y[begun], RATE)
+    assert found.explained > 0.9998
+    for name, value in values.items():
+        assert found.values[name] == pytest.approx(value, rel=0.05), name
+
+
 def test_a_limit_is_where_the_torque_ends():
     description, _ = freed({**PID, "torque_limit_nm": 6.0}, "p", "i", "torque_limit_nm")
     found = identify_gains(description, *record(PID, torque_limit_nm=6.0), RATE)
