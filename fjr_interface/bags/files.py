@@ -19,6 +19,8 @@ from .sqlite import SqliteFile
 MCAP, SQLITE = ".mcap", ".db3"
 _STORAGE = {MCAP: "mcap", SQLITE: "sqlite3"}
 _NUMBER = re.compile(r"(.*?)(?:_([0-9]{1,9}))?")
+ROS_1 = ".bag"
+"""How the name of a bag of ROS 1 ends."""
 
 
 @dataclass(frozen=True)
@@ -168,6 +170,8 @@ def find_bags(folder: Path | str) -> list[Path]:
     try:
         if folder.suffix in _STORAGE and folder.is_file():
             return [folder]
+        if folder.suffix == ROS_1 and folder.is_file():
+            raise InputError(of_ros_1(folder))
         bags = _bags_of(folder)
         if bags != [folder]:
             children = (path for path in folder.iterdir() if not path.name.startswith("."))
@@ -176,8 +180,19 @@ def find_bags(folder: Path | str) -> list[Path]:
     except OSError as error:
         raise InputError(f"{folder}: is not a readable folder ({error.strerror}).") from None
     if not bags:
+        old = sorted(folder.glob(f"*{ROS_1}"))
+        if old:
+            raise InputError(of_ros_1(old[0]))
         raise InputError(f"{folder}: holds no bag; name a bag or a folder of bags.")
     return bags
+
+
+def of_ros_1(file: Path) -> str:
+    """Return what to do with a bag of ROS 1."""
+    return (
+        f"{file}: is a bag of ROS 1; rosbags-convert --src {file} --dst FOLDER, which is installed "
+        "with fjr, makes one of ROS 2."
+    )
 
 
 def _bags_of(folder: Path) -> list[Path]:

@@ -10,6 +10,7 @@ from typing import TypeVar
 import numpy as np
 
 from fjr_interface.bags.audit import LARGEST
+from fjr_interface.bags.files import ROS_1, of_ros_1
 from fjr_kit.errors import InputError
 
 from . import hdf5, json_log, mat, numpy_file, text
@@ -34,6 +35,18 @@ READERS: dict[str, Callable[[Path], Names]] = {
     ".hdf5": hdf5.open_hdf5,
 }
 """What reads a file, by its suffix; each may be followed by .gz where it holds text."""
+_BY_PANDAS = "as by pandas.{}(FILE).to_csv(NEW)"
+ELSEWHERE: dict[str, str] = {
+    ".parquet": f"write it as CSV or NPZ, {_BY_PANDAS.format('read_parquet')}",
+    ".feather": f"write it as CSV or NPZ, {_BY_PANDAS.format('read_feather')}",
+    ".xlsx": f"save its sheet as CSV, {_BY_PANDAS.format('read_excel')}",
+    ".xls": f"save its sheet as CSV, {_BY_PANDAS.format('read_excel')}",
+    ".pkl": f"write it as CSV or NPZ, {_BY_PANDAS.format('read_pickle')}",
+    ".tdms": "export it as CSV, as by nptdms.TdmsFile(FILE).as_dataframe().to_csv(NEW)",
+    ".mf4": "export it as CSV, as by asammdf.MDF(FILE).to_dataframe().to_csv(NEW)",
+    ".mdf": "export it as CSV, as by asammdf.MDF(FILE).to_dataframe().to_csv(NEW)",
+}
+"""What to do with files that are not read, by their suffix."""
 _TEXTS = tuple(s for s, read in READERS.items() if read in (text.open_text, json_log.open_json))
 
 
@@ -140,8 +153,12 @@ def _of_file(path: Path, use: Callable[[Names], Result]) -> Result:
     suffix = suffixes[-2] if packed and len(suffixes) > 1 else path.suffix.lower()
     if not path.is_file():
         raise InputError(f"{path}: there is no such file.")
+    if suffix == ROS_1:
+        raise InputError(of_ros_1(path))
     try:
         reader = READERS.get(suffix) if suffix in _TEXTS or not packed else None
+        if suffix in ELSEWHERE:
+            raise InputError(f"{path}: files {suffix} are not read here; {ELSEWHERE[suffix]}.")
         if reader is None and (packed or not is_text(path)):
             raise InputError(
                 f"{path}: cannot tell the format by the suffix {path.suffix!r}; it must be one of "
