@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 from collections import Counter
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
@@ -190,7 +191,7 @@ def find_bags(folder: Path | str) -> list[Path]:
 def of_ros_1(file: Path) -> str:
     """Return what to do with a bag of ROS 1."""
     return (
-        f"{file}: is a bag of ROS 1; rosbags-convert --src {file} --dst FOLDER, which is installed "
+        f"{file}: is a bag of ROS 1; rosbags-convert --src {shlex.quote(str(file))} --dst FOLDER, which is installed "
         "with fjr, makes one of ROS 2."
     )
 

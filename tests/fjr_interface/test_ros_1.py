@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -27,7 +28,7 @@ def old_bag(tmp_path) -> Path:
     types = get_typestore(Stores.ROS1_NOETIC)
     state, header = types.types["sensor_msgs/msg/JointState"], types.types["std_msgs/msg/Header"]
     stamp = types.types["builtin_interfaces/msg/Time"]
-    with Writer(tmp_path / "old.bag") as bag:
+    with Writer(tmp_path / "old run.bag") as bag:
         topic = bag.add_connection("/joint_states", state.__msgtype__, typestore=types)
         for k in range(SAMPLES):
             ns = 1_500_000_000 * 10**9 + k * 10**9 // RATE_HZ
@@ -35,7 +36,7 @@ def old_bag(tmp_path) -> Path:
             values = np.array([POSITION[k]]), np.zeros(1), np.array([EFFORT[k]])
             message = state(at, ["knee"], *values)
             bag.write(topic, ns, types.serialize_ros1(message, state.__msgtype__))
-    return tmp_path / "old.bag"
+    return tmp_path / "old run.bag"
 
 
 def test_the_way_that_the_sentence_names_leads_to_the_signals(old_bag, tmp_path):
@@ -45,7 +46,7 @@ def test_the_way_that_the_sentence_names_leads_to_the_signals(old_bag, tmp_path)
         find_bags(tmp_path)
     command = re.search(r"(rosbags-convert .*) FOLDER", str(refused.value))
     assert command is not None
-    program, *words = command[1].split()
+    program, *words = shlex.split(command[1])
     new = tmp_path / "new"
     subprocess.run([Path(sys.executable).with_name(program), *words, new], check=True)
     sources = {"position": "position[knee]", "torque": "effort[knee]"}
