@@ -190,9 +190,10 @@ def find_bags(folder: Path | str) -> list[Path]:
 
 def of_ros_1(file: Path) -> str:
     """Return what to do with a bag of ROS 1."""
+    source = shlex.quote(str(file))
     return (
-        f"{file}: is a bag of ROS 1; rosbags-convert --src {shlex.quote(str(file))} --dst FOLDER, which is installed "
-        "with fjr, makes one of ROS 2."
+        f"{file}: is a bag of ROS 1; rosbags-convert --src {source} --dst FOLDER, which is "
+        "installed with fjr, makes one of ROS 2."
     )
 
 
