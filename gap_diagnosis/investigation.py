@@ -246,7 +246,7 @@ def _tied(fitter: CellFitter, found: Found, tested: Tested, names: Sequence[str]
     must show a cause at all.
     """
     best = found.best
-    near = {*partners([tested.effect], set(names))}
+    near = {*partners([tested.effect], set(names), fitter.nominal)}
     others = sorted({*near, *found.alternatives.get(tested.effect, ())} - set(best.effects))
     tied, beside = [], tested.without.effects
     searched = {fit.effects: fit for fits in found.rivals.values() for fit in fits}

@@ -99,12 +99,21 @@ def parameter(name: str) -> EffectParameter:
     return _BY_NAME[name]
 
 
-def near_equivalents(identifier: str) -> frozenset[str]:
-    """Return the effects that a motor-side encoder can hardly tell from one, without it."""
-    family = EFFECTS[identifier].looks_like
-    return frozenset(e.identifier for e in CATALOGUE if family and e.looks_like == family) - {
-        identifier
-    }
+def near_equivalents(identifier: str, *, held: bool = False) -> frozenset[str]:
+    """Return the effects that a motor-side encoder can hardly tell from one, without it.
+
+    Args:
+        identifier: of the one.
+        held: whether the link is held.
+    """
+    own = EFFECTS[identifier]
+
+    def alike(other: Effect) -> bool:
+        always = own.looks_like and other.looks_like == own.looks_like
+        if_held = own.looks_like_held and other.looks_like_held == own.looks_like_held
+        return bool(always or (held and if_held))
+
+    return frozenset(e.identifier for e in CATALOGUE if alike(e)) - {identifier}
 
 
 def holders(identifier: str) -> frozenset[str]:

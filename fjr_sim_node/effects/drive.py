@@ -37,6 +37,7 @@ DRIVE: tuple[Effect, ...] = (
         ripple("amplitude_nm", "N m", 1e4, "the torque ripple"),
         ripple_starts("amplitude_nm", 0.002),
         looks_like="constant torque",
+        looks_like_held="ripple of the torque",
         ripple=True,
     ),
     Effect(

@@ -82,6 +82,8 @@ class Effect:
             greatest torque); empty for what only a gate looks for.
         looks_like: name of the family of effects that a motor-side encoder can hardly tell apart;
             empty if nothing is that near.
+        looks_like_held: the same of effects that nothing tells apart while the link is held, where
+            the deflection is the motor's angle.
         same_as: what it equals exactly, in words; empty if nothing.
         ripple: whether it is periodic in the motor angle, so that `cycles_per_turn` is searched.
         of_load: whether it goes with the torque in the gear.
@@ -111,6 +113,7 @@ class Effect:
     parameters: tuple[EffectParameter, ...]
     starts: tuple[Start, ...] = ()
     looks_like: str = ""
+    looks_like_held: str = ""
     same_as: str = ""
     ripple: bool = False
     of_load: bool = False

@@ -65,6 +65,7 @@ FRICTION: tuple[Effect, ...] = (
         "paper eq. 2, fs sgn(q')",
         _lacking("Coulomb friction", "nm", "N m", "fsm", "fs"),
         _on_either_side("nm", (0.02, 0.2)),
+        looks_like_held="friction of the motor",
         same_as="a larger fsm or fs",
         of_bare_plant=True,
     ),
@@ -77,6 +78,7 @@ FRICTION: tuple[Effect, ...] = (
         "paper eq. 2, fv q'",
         _lacking("Viscous friction", "nm_s_rad", "N m s/rad", "fvm", "fv"),
         _on_either_side("nm_s_rad", (0.02,)),
+        looks_like_held="drag of the motor",
         same_as="a larger fvm or fv",
         of_bare_plant=True,
     ),
@@ -139,6 +141,7 @@ FRICTION: tuple[Effect, ...] = (
         # A side that starts below what is negligible never leaves it.
         ({"motor_rad": _SHORT, "link_rad": _SHORT},),
         looks_like="friction that builds up",
+        looks_like_held="friction of the motor",
         modifies="coulomb_friction",
     ),
     Effect(

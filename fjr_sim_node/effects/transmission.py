@@ -74,6 +74,7 @@ TRANSMISSION: tuple[Effect, ...] = (
         ),
         ({"torque_nm": (0.003, 0.03), "displacement_rad": (3e-3, 0.03, 0.2)},),
         looks_like="loss in the transmission",
+        looks_like_held="friction of the motor",
     ),
     Effect(
         "transmission_damping",
@@ -85,6 +86,7 @@ TRANSMISSION: tuple[Effect, ...] = (
         (size("nm_s_rad", "N m s/rad", "Torque per deflection velocity"),),
         ({"nm_s_rad": (0.005, 0.05)},),
         looks_like="loss in the transmission",
+        looks_like_held="drag of the motor",
     ),
     Effect(
         "kinematic_error",
@@ -95,6 +97,7 @@ TRANSMISSION: tuple[Effect, ...] = (
         "Tuttle, Seering 1996, IEEE Trans. Robotics and Automation 12(3)",
         ripple("amplitude_rad", "rad", 1.0, "the angle error"),
         ripple_starts("amplitude_rad", 3e-3),
+        looks_like_held="ripple of the torque",
         ripple=True,
     ),
     Effect(

@@ -107,7 +107,7 @@ def _in_its_place(
         for fit in fits
         if fit.effects[:-1] == best.effects[: best.effects.index(effect)]
     ]
-    near = [*partners([effect], set(names)), fx.EFFECTS[effect].modifies]
+    near = [*partners([effect], set(names), fitter.nominal), fx.EFFECTS[effect].modifies]
     near += [name for _, name in sorted(chosen, reverse=True)[:_RIVALS]]
     others = [e for e in dict.fromkeys(near) if e in names and e not in best.effects]
     fits = []

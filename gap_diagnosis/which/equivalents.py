@@ -11,10 +11,17 @@ ONE_CAUSE = 0.04
 are one cause whose law has another form than the catalogue's, by up to a fifth of what it does."""
 
 
-def partners(found: Sequence[str], among: set[str]) -> list[str]:
-    """Return the near equivalents of effects, so that a set is never short of one not tried."""
-    alike = {other for effect in found for other in fx.near_equivalents(effect)} | set(found)
-    return sorted(among & alike)
+def partners(found: Sequence[str], among: set[str], nominal: Mapping[str, float]) -> list[str]:
+    """Return the near equivalents of effects, so that a set is never short of one not tried.
+
+    Args:
+        found: identifiers of the effects.
+        among: identifiers that may be returned.
+        nominal: bare parameters, which say whether the link is held.
+    """
+    held = "j" not in nominal and "k0" in nominal
+    alike = {e for effect in found for e in fx.near_equivalents(effect, held=held)}
+    return sorted(among & (alike | set(found)))
 
 
 def holders(found: Sequence[str], among: Sequence[str]) -> list[str]:

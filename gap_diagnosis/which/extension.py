@@ -68,7 +68,7 @@ class Extension:
         ordered = sorted((e for e in proposals if proposals[e]), key=lambda e: proposals[e][0][0])
         chosen = self._worth_a_fit(parent, proposals, ordered[: _FITTED[later]])
         held = founded(holders(chosen[:2], names), parent.effects, nominal, names)
-        alike = {*partners(chosen[:2], set(effects)), *held}
+        alike = {*partners(chosen[:2], set(effects), nominal), *held}
         for effect in sorted(alike - set(chosen)):
             if effect not in proposals:
                 again = screened.get(effect) or self._fitter.screening(parent, effect)
@@ -157,7 +157,7 @@ class Extension:
         """Return ranked fits, those that lead and may be chosen taken further, ranked anew."""
         leading = fits[:_POLISHED]
         first = [fit.effects[-1] for fit in leading]
-        near = len(partners(first[:1], set(first))) > 1
+        near = len(partners(first[:1], set(first), self._fitter.nominal)) > 1
         promising = [fit for fit in leading if self._may_be_chosen(fit, leading[0], parent)]
         if near and promising:
             promising = list(leading)
@@ -229,7 +229,11 @@ class Extension:
             np.sum(weights.counts * each, axis=0) / weights.counts.sum(axis=0) for each in over
         ]
         open_bands = (bands[0] > NOTHING_LEFT) & (bands[0] > _MOST * bands[1])
-        return [] if open_bands.any() else partners(parent.effects, set(self.effects))
+        return (
+            []
+            if open_bands.any()
+            else partners(parent.effects, set(self.effects), self._fitter.nominal)
+        )
 
     def screened(self, parent: CellFit, effects: Sequence[str]) -> dict[str, Screening]:
         """Return screenings beside a fit: of all effects the first time, then of those that count.

@@ -22,6 +22,7 @@ from gap_diagnosis.model.simulated_rig import Simulator
 from gap_diagnosis.report.updated_parameters import simulator_values
 from gap_diagnosis.where.residual_map import residual_map
 from gap_diagnosis.which.catalogue import catalogue
+from gap_diagnosis.which.equivalents import partners
 from gap_diagnosis.which.search_space import Scales, starts
 
 NOMINAL = PLANT.defaults()
@@ -238,6 +239,20 @@ def test_effects_of_drive_and_transmission_are_found_before_a_held_link(effect):
     possible = set(catalogue({**found.best.model.plant}))
     assert not possible & {"stribeck_friction_link", "extra_mode", "gravity", "cable"}
     assert {"hysteresis", "backlash", "load_friction", "quadratic_friction"} <= possible
+
+
+def test_drag_of_motor_and_of_transmission_are_one_before_a_held_link():
+    case = simulate_case({}, seed=7, plant={**HELD, "fvm": 4.0}, **SMALL)
+    nominal = {**NOMINAL, **HELD, "fvm": 0.0}
+    drags = ("viscous_friction", "transmission_damping")
+    told, _ = found_in(case.recorded, nominal, *drags, "delay")
+    (either,) = told.equivalent
+    assert sorted(either) == sorted(drags)
+    (size,) = (told.parameters[n] for n in told.parameters if n.split(".")[0] in drags)
+    assert size.value == pytest.approx(4.0, rel=0.05)
+    assert partners(["viscous_friction"], set(drags), nominal) == ["viscous_friction"]
+    assert partners(["viscous_friction"], set(drags), {"jm": 0.2, "k0": 1e3}) == sorted(drags)
+    assert partners(["viscous_friction"], set(drags), {"jm": 0.2}) == ["viscous_friction"]
 
 
 def test_effects_of_transmission_and_link_are_not_looked_for_on_a_rigid_axis():
