@@ -36,12 +36,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Time diagnoses of random rigs.")
     parser.add_argument("--cases", type=int, default=12, help="of each world")
     parser.add_argument("--seed", type=int, default=900)
+    parser.add_argument("--worlds", nargs="+", choices=WORLDS, default=WORLDS)
     given = parser.parse_args()
     print(describe() + "\n")
     print("| world | cases | median s | quartiles | times the allowed | processor, median s |")
     print("|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as folder:
-        for world in WORLDS:
+        for world in given.worlds:
             times = []
             for number in range(given.cases + 1):
                 case = Path(folder) / f"{world}_{number}"
