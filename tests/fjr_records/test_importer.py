@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import sys
 
 import numpy as np
 import pytest
@@ -331,12 +332,13 @@ def test_bad_record_is_refused_and_nothing_is_written(tmp_path, values, chosen, 
 @pytest.mark.parametrize(
     ("name", "content", "says"),
     [
-        ("rig.xlsx", b"PK", r"suffix '.xlsx'; it must be one of .mat, .npz, .csv"),
+        ("rig.xyz", b"PK", r"suffix '.xyz'; it must be one of .mat, .npz, .csv"),
+        ("rig.xlsx", b"PK", "files .xlsx are not read here; save its sheet as CSV"),
         ("rig.npz", b"PK\x03\x04 nothing", "is not a NPZ archive"),
         ("rig.npz", b"", "is not a NPZ archive"),
         ("rig.mat", b"MATLAB 5.0 MAT-file" + bytes(200), "is not a readable MAT file"),
         ("rig.mat", b"", "is not a readable MAT file"),
-        ("rig.mat", b"MATLAB 7.3 MAT-file, Platform: GLNXA64", "is a MATLAB 7.3 file"),
+        ("rig.mat", b"MATLAB 7.3 MAT-file, Platform: GLNXA64", "is not a readable MATLAB 7.3 file"),
         ("rig.csv", b"", "there is no r; the file holds nothing"),
         ("rig.csv", b"\xff\xfe\x00", "is not a text file in UTF-8"),
         ("rig.csv", b"t,u,y\n1,2,3\n", "there is no r; the file holds t, u, y"),
@@ -354,6 +356,14 @@ def test_bad_file_is_refused(tmp_path, name, content, says):
     sentence = str(refused.value)
     assert sentence.startswith(f"{file}: ") and sentence.endswith(".") and "\n" not in sentence
     assert [path.name for path in tmp_path.iterdir()] == [name]
+
+
+def test_without_its_library_a_file_of_matlab_7_3_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "h5py", None)
+    file = tmp_path / "rig.mat"
+    file.write_bytes(b"MATLAB 7.3 MAT-file, Platform: GLNXA64")
+    with pytest.raises(InputError, match=r"is a MATLAB 7.3 file.*install fjr-rig\[hdf5\]"):
+        import_files([file], tmp_path / "out", options())
 
 
 def test_files_must_belong_together_and_the_folder_be_new(tmp_path):
