@@ -21,7 +21,7 @@ from .made_torque import MADE, made_torque
 from .own_stamps import own_stamps
 from .part import LEAST_SAMPLES
 from .repetition import Repetition, find_repetition, insists
-from .stamps import LONGEST_S
+from .stamps import FASTEST_HZ, LONGEST_S
 from .timing import Timing, of_one_clock, of_own_clocks, resample
 from .wraps import without_wraps
 
@@ -141,6 +141,10 @@ def read_samples(path: Path, options: ImportOptions) -> Samples:
         q.removesuffix(OWN_TIME) for q, each in columns.items() if is_time(q) and each.by_factor
     }
     skip, keep, rate_hz = options.skip_samples, options.keep_samples, options.sample_rate_hz
+    if rate_hz is not None and not 0.0 < rate_hz <= FASTEST_HZ:
+        raise InputError(
+            f"{path}: {rate_hz:g} Hz is none; give a sample rate of up to {FASTEST_HZ:g} Hz."
+        )
     if stamps:
         if options.repeat_reference:
             raise InputError(

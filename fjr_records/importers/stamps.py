@@ -64,7 +64,7 @@ def read_clock(
         InputError: it is no time, or not in s.
     """
     if time is None:
-        if given_hz is None or not 0 < given_hz <= FASTEST_HZ:
+        if given_hz is None:
             raise InputError(
                 f"{source}: give a sample rate of up to {FASTEST_HZ:g} Hz, or map a time column."
             )

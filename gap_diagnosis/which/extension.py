@@ -229,11 +229,9 @@ class Extension:
             np.sum(weights.counts * each, axis=0) / weights.counts.sum(axis=0) for each in over
         ]
         open_bands = (bands[0] > NOTHING_LEFT) & (bands[0] > _MOST * bands[1])
-        return (
-            []
-            if open_bands.any()
-            else partners(parent.effects, set(self.effects), self._fitter.nominal)
-        )
+        if open_bands.any():
+            return []
+        return partners(parent.effects, set(self.effects), self._fitter.nominal)
 
     def screened(self, parent: CellFit, effects: Sequence[str]) -> dict[str, Screening]:
         """Return screenings beside a fit: of all effects the first time, then of those that count.

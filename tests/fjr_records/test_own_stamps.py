@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 
 import numpy as np
 import pytest
@@ -176,6 +177,15 @@ def test_wrong_stamps_are_refused_in_a_sentence(tmp_path, content, specs, says):
     with pytest.raises(InputError, match=says) as refused:
         understood(tmp_path / "rig.npz", *specs)
     assert str(refused.value).startswith(f"{tmp_path / 'rig.npz'}: ")
+
+
+@pytest.mark.parametrize("rate_hz", [-5.0, 0.0, math.nan, math.inf, 1e9])
+@pytest.mark.parametrize("specs", [OWN, ("torque=u", "position=y", "time=w"), OWN[:2]])
+def test_a_rate_that_is_none_is_refused_whatever_the_stamps(tmp_path, rate_hz, specs):
+    wild = np.cumsum(np.random.default_rng(2).uniform(1e-3, 3e-3, SAMPLES))
+    np.savez(tmp_path / "rig.npz", **arrays(w=wild))
+    with pytest.raises(InputError, match=r"give a sample rate of up to 1e\+06 Hz"):
+        understood(tmp_path / "rig.npz", *specs, sample_rate_hz=rate_hz)
 
 
 def test_a_period_has_no_stamps_of_its_own(tmp_path):
