@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -14,7 +15,7 @@ from ..which.cell_fits import CellFitter
 from ..which.comparison import CellFit
 from ..which.equivalents import founded, partners
 from ..which.found import Found
-from ..which.gains import gain, stands_for
+from ..which.gains import gain, left_of, stands_for
 from .judgement import FEWEST_PARTS
 from .tested_causes import Tested, causes_with_tests
 
@@ -24,7 +25,7 @@ _MAY_BE_UNSURE = 2
 SURE = 0.8
 """How surely a cause beyond the two that gain most must be present."""
 _TWICE = 0.15
-"""Of the gap: where each of two near equivalents closes less beside the other, either alone does
+"""Of what two near equivalents close: where each closes less beside the other, either alone does
 nearly all, and both together are one cause whose law has another form than the catalogue's."""
 _RIVALS = 3  # that did best when a cause was chosen, one of which may take its place
 _MUCH = 0.5
@@ -46,7 +47,8 @@ def kept(
 
     A cause whose size alone is not certain may be blurred by another one: then that goes which
     gains least of all. Of those that pass, what names another one twice goes, and what is not sure,
-    but for the two that gain most. Where too little is held out, no cause is kept.
+    but for the two that gain most and for what others cannot do without: a cause that is sure is
+    lost where the fit lacks what it acts beside. Where too little is held out, no cause is kept.
 
     Args:
         fitter: of the search.
@@ -65,10 +67,17 @@ def kept(
     if not steps[-1].solution.converged:
         steps[-1] = fitter.further(steps[-1])
     replaced: set[str] = set()
+    bearing: set[str] = set()
+
+    def tests_of(fit: CellFit) -> list[Tested]:
+        progress(f"tests of {' + '.join(fit.effects)}")
+        return causes_with_tests(fitter, fit, steps[0], scatter) if fit.effects else []
+
     while steps[-1].effects:
-        progress(f"tests of {' + '.join(steps[-1].effects)}")
-        tested = causes_with_tests(fitter, steps[-1], steps[0], scatter)
-        failed = [t for t in tested if not t.passed] or _twice(tested) or _guesses(tested)
+        tested = tested or tests_of(steps[-1])
+        failed = [t for t in tested if not t.passed] or _twice(fitter, steps[-1], tested)
+        guessed = [] if failed else [t for t in _guesses(tested) if t.effect not in bearing]
+        failed = failed or guessed
         if not failed:
             break
         blurred = any(t.passes_beside_size and not t.certain for t in failed)
@@ -82,15 +91,13 @@ def kept(
                 replaced.add(other.effects[-1])
                 steps, tested = [*before, other], []
                 continue
+        fewer = _taken_out(fitter, before, weakest)
+        tests = tests_of(fewer[-1])
+        if guessed and _bears(tested, tests):
+            bearing.add(weakest.effect)
+            continue
         notes += [*_changing(weakest), *_kin(weakest)]
-        last = weakest.without
-        same = last.effects == before[-1].effects
-        if not same:
-            last = _begun_anew(fitter, last, before[-1])
-        steps = before if same else [*before, last]
-        if same and fitter.gains(last, before[-1]).sum() > 0.0:
-            steps[-1] = last
-        tested = []
+        steps, tested = fewer, tests
     if tested and any(len(fit.effects) != count for count, fit in enumerate(steps)):
         steps = [steps[0], *_one_by_one(fitter, steps[-1], tested)]
     return replace(found, steps=steps, notes=tuple(notes)), tested
@@ -144,6 +151,32 @@ def _kin(tested: Tested) -> list[str]:
     ]
 
 
+def _taken_out(fitter: CellFitter, before: Sequence[CellFit], weakest: Tested) -> list[CellFit]:
+    """Return the steps without a cause.
+
+    Args:
+        fitter: of the search.
+        before: the steps that lack it.
+        weakest: the cause, with the last fit without it.
+    """
+    last = weakest.without
+    if last.effects != before[-1].effects:
+        return [*before, _begun_anew(fitter, last, before[-1])]
+    better = fitter.gains(last, before[-1]).sum() > 0.0
+    return [*before[:-1], last if better else before[-1]]
+
+
+def _bears(tested: Sequence[Tested], without: Sequence[Tested]) -> bool:
+    """Tell whether a cause bears others: these are sure beside it, and not present without it.
+
+    Args:
+        tested: all causes.
+        without: the others, tested without it.
+    """
+    sure = {t.effect for t in tested if t.present >= SURE}
+    return any(t.effect in sure and not t.passed for t in without)
+
+
 def _begun_anew(fitter: CellFitter, fit: CellFit, before: CellFit) -> CellFit:
     """Return a fit that has lost a cause, or the same causes begun from an earlier step, if better.
 
@@ -161,8 +194,14 @@ def _begun_anew(fitter: CellFitter, fit: CellFit, before: CellFit) -> CellFit:
 
 
 def _one_by_one(fitter: CellFitter, fit: CellFit, tested: Sequence[Tested]) -> list[CellFit]:
-    """Return a fit reached cause after cause, what gains most first: each has one cause more."""
-    order = [t.effect for t in sorted(tested, key=lambda t: -t.gain.mean)]
+    """Return a fit reached cause after cause, what gains most first: each has one cause more.
+
+    What changes another cause comes after it, since before it does nothing.
+    """
+    worth = {t.effect: t.gain.mean for t in tested}
+    bases = {effect: fx.EFFECTS[effect].modifies for effect in worth}
+    worth |= {e: min(worth[e], worth[base]) for e, base in bases.items() if base in worth}
+    order = sorted(worth, key=lambda e: (-worth[e], bases[e] in worth))
     without = {t.effect: t.without for t in tested}
     fits = [fit]
     for effect in order[:0:-1]:
@@ -171,11 +210,22 @@ def _one_by_one(fitter: CellFitter, fit: CellFit, tested: Sequence[Tested]) -> l
     return [replace(one, effects=tuple(order[:count])) for count, one in enumerate(fits, 1)]
 
 
-def _twice(tested: Sequence[Tested]) -> list[Tested]:
-    """Return the causes that close little beside a near equivalent which closes little as well."""
-    little = {t.effect for t in tested if t.share.value < _TWICE}
-    names = {e for e in little if fx.near_equivalents(e) & little - {e}}
-    return [t for t in tested if t.effect in names]
+def _twice(fitter: CellFitter, best: CellFit, tested: Sequence[Tested]) -> list[Tested]:
+    """Return the causes that close little beside a near equivalent which closes little as well.
+
+    Little of what both close together; beside others, that may itself be little of the gap.
+    """
+    found: set[str] = set()
+    little = {t.effect: t for t in tested if t.share.value < _TWICE}
+    for effect, other in itertools.combinations(little, 2):
+        if other not in fx.near_equivalents(effect):
+            continue
+        neither = fitter.without(little[effect].without, other)
+        alone = (little[effect].without, little[other].without)
+        left, *others = (left_of(fitter, fit, neither) for fit in (best, *alone))
+        if max(others) - left < _TWICE * (1.0 - left):
+            found |= {effect, other}
+    return [t for t in tested if t.effect in found]
 
 
 def _guesses(tested: Sequence[Tested]) -> list[Tested]:

@@ -26,10 +26,12 @@ from .other_splits import other_splits
 from .ripples import Ripples
 from .ripples_passed import fewest_cycles
 from .scales import Scales
-from .screening import LARGEST, LARGEST_OF_TORQUES, Proposal, Screening
+from .screening import LARGEST, LARGEST_OF_TORQUES, Proposal, Screening, as_they_are
 from .search_space import Space, space_for, starts
-from .seen_torques import LOADS, SeenTorques
+from .seen_torques import FRICTIONS, LOADS, SeenTorques
 
+STICKING = ("coulomb_friction", "presliding_friction")
+"""Friction, and the bristles by which it yields before it slides."""
 _REFIT_ROUNDS = (8, 5, 5)
 _ADDED_ROUNDS = (6, 4)
 _LEAST_PROMISE = 20.0  # a start that gains less than this (twice the nats) is not pursued
@@ -93,7 +95,17 @@ class CellFitter(Comparison):
         elif effect == DRIFT:
             seen = self._drifts()
         seeds = [*starts(effect, self.scales, cycles, self.nominal), *seen]
-        return self.screening_of(parent, seeds)
+        return self.screening_of(parent, seeds, self._frictions(parent, effect, seeds))
+
+    def _frictions(
+        self, parent: CellFit, effect: str, seeds: Sequence[Mapping[str, float]]
+    ) -> list[tuple[Space, np.ndarray]]:
+        """Return points at which a law of friction explains what is seen along the motion."""
+        if effect not in FRICTIONS or self.evidence.slow:
+            return []
+        space = self._space(parent, seeds[0])
+        points = [space.point(model) for model in self._ripples(parent)[1].friction(effect)]
+        return [(space, np.clip(point, *space.bounds())) for point in points]
 
     def _drifts(self) -> list[dict[str, float]]:
         """Return starts of a drift of friction over all runs."""
@@ -112,8 +124,13 @@ class CellFitter(Comparison):
             return []
         return self._ripples(parent)[0].harmonics(effect, tried, RIPPLES_TRIED)
 
-    def screening_of(self, parent: CellFit, seeds: Sequence[Mapping[str, float]]) -> Screening:
-        """Return what starts promise beside a fit."""
+    def screening_of(
+        self,
+        parent: CellFit,
+        seeds: Sequence[Mapping[str, float]],
+        points: Sequence[tuple[Space, np.ndarray]] = (),
+    ) -> Screening:
+        """Return what starts promise beside a fit; arguments as those of `Screening`."""
         return Screening(
             parent.solution,
             parent.model,
@@ -122,6 +139,7 @@ class CellFitter(Comparison):
             partial(self._residuals, parent.variance),
             partial(self.weights.costs, parent.variance),
             LARGEST_OF_TORQUES if self.evidence.slow else LARGEST,
+            points,
         )
 
     def from_part(self, parent: CellFit, whole: str, fit: CellFit) -> list[Proposal]:
@@ -148,8 +166,40 @@ class CellFitter(Comparison):
         costs = partial(self.weights.costs, parent.variance)
         return screened.gain_beside(parent.solution, ratio, costs)
 
+    def sticking(self, parent: CellFit) -> CellFit | None:
+        """Return a parent's explanation with Coulomb friction and the bristles by which it sticks.
+
+        What is held between its moves ends elsewhere if it yields while it sticks, and where it
+        rests decides over a weak loop: then Coulomb friction alone makes the error no smaller. None
+        if no start promises anything.
+        """
+        friction, bristles = STICKING
+        added = starts(friction, self.scales, None, self.nominal)[0]
+        shapes = starts(bristles, self.scales, None, self.nominal)
+        space = self._space(parent, {**added, **shapes[0]})
+        seen = self._ripples(parent)[1].friction(friction)
+        points = [
+            np.clip(space.point(Model(m.plant, {**m.effects, **shape})), *space.bounds())
+            for m in seen
+            for shape in shapes
+        ]
+        if not points:
+            return None
+        proposals = as_they_are(
+            [(space, point) for point in points],
+            parent.solution,
+            partial(self._residuals, parent.variance),
+            partial(self.weights.costs, parent.variance),
+        )
+        return self.add(parent, bristles, proposals, 1, friction)
+
     def add(
-        self, parent: CellFit, effect: str, proposals: Sequence[Proposal], most: int = _STARTS
+        self,
+        parent: CellFit,
+        effect: str,
+        proposals: Sequence[Proposal],
+        most: int = _STARTS,
+        *before: str,
     ) -> CellFit | None:
         """Fit a parent's explanation with one effect more; None if no start promises anything.
 
@@ -158,6 +208,7 @@ class CellFitter(Comparison):
             effect: identifier of the effect to add.
             proposals: from `screening(parent, effect)`.
             most: how many starts are pursued.
+            *before: what is added with it.
         """
         best: CellFit | None = None
         kept: list[Space] = []
@@ -170,13 +221,15 @@ class CellFitter(Comparison):
             if any(space is one for one in kept):
                 continue
             kept.append(space)
-            known = parent.solution.jacobian if len(kept) == 1 else None
-            fit = self._reweighted(
-                (*parent.effects, effect), space, point, parent.variance, _ADDED_ROUNDS, known
-            )
+            errors = self.evidence.errors([space.model(point)], self.fit_parts)[0]
+            variance = self.weights.variance(errors)
+            ratio = self.weights.weight(variance) / self.weights.weight(parent.variance)
+            known = parent.solution.jacobian * ratio[:, None] if len(kept) == 1 else None
+            effects = (*parent.effects, *before, effect)
+            fit = self._reweighted(effects, space, point, variance, _ADDED_ROUNDS, known)
             if best is None or self.gains(fit, best).sum() > 0.0:
                 best = fit
-        return None if best is None else replace(best, acts=self.acted(best, effect))
+        return None if best is None else replace(best, acts=self.acted(best, *before, effect))
 
     def promises(self, parent: CellFit, proposals: Sequence[Proposal]) -> bool:
         """Tell whether a start beside a fit gains enough to be pursued."""

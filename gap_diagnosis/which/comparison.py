@@ -38,7 +38,7 @@ class CellFit:
         variance: (cells,), of an error in each cell, rad2.
         left: (parts, bands), mean square of what is left on each part that selects, noise and the
             simulation's own error added, rad2.
-        acts: (parts,), whether the effect that was added last moves a part that selects; None
+        acts: (parts,), whether what was added last moves a part that selects; None
             where that was not looked at.
     """
 
@@ -106,8 +106,8 @@ class Comparison:
         """
         return self.weights.gained(after.left, before.left).sum(axis=1)
 
-    def acted(self, fit: CellFit, effect: str) -> np.ndarray:
-        """Return whether an effect moves each part that selects, beside what the fit leaves there.
+    def acted(self, fit: CellFit, *effects: str) -> np.ndarray:
+        """Return whether effects move each part that selects, beside what the fit leaves there.
 
         A saturation does nothing where it is not reached; what such a part gains or loses says
         something of the parameters beside it, and of friction that scatters from run to run.
@@ -115,7 +115,8 @@ class Comparison:
         Returns:
             bool (parts,).
         """
-        rest = {n: v for n, v in fit.model.effects.items() if not n.startswith(f"{effect}.")}
+        values = fit.model.effects.items()
+        rest = {n: v for n, v in values if n.split(".", 1)[0] not in effects}
         models = [fit.model, Model(fit.model.plant, rest)]
         errors = self.evidence.errors(models, self.select_parts)
         moved = self.weights.mean_squares(errors[1] - errors[0])

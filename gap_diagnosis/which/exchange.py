@@ -28,7 +28,7 @@ def replace_bounded(found: Found, fitter: CellFitter, extension: Extension) -> N
         if not at_its_bound(best, effect):
             continue
         without = fitter.without(best, effect)
-        fits = extension.extended(without, found.steps[0])
+        fits = extension.extended(without, found.steps)
         free = [f for f in fits if not at_its_bound(f, f.effects[-1])]
         other = extension.chosen(free, without)
         worth = extension.gain(best, without).mean
@@ -55,7 +55,7 @@ def drop_hindering(found: Found, fitter: CellFitter, extension: Extension) -> No
         last = best.effects[-1]
         rest = fitter.without(fewer, last)
         fits = extension.ranked(
-            [fewer, *extension.extended(rest, found.steps[0], [last])], rest
+            [fewer, *extension.extended(rest, found.steps, [last])], rest
         )  # fmt: skip
         other = extension.chosen(fits, rest) or fewer
         before = [fit for fit in found.steps if not {effect, last} & {*fit.effects}]

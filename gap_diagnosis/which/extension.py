@@ -8,10 +8,10 @@ import numpy as np
 
 from fjr_sim_node import effects as fx
 
-from .cell_fits import CellFitter
+from .cell_fits import STICKING, CellFitter
 from .comparison import NOTHING_LEFT, CellFit
 from .equivalents import ONE_CAUSE, founded, holders, partners, plainness
-from .gains import NEARLY_ALL, Gain, closed, gain, left_of, stands_for
+from .gains import NEARLY_ALL, Gain, closed, gain, left_of, likelihood, stands_for
 from .harmonics import WORTH_A_HARMONIC, with_second_harmonic
 from .screening import Proposal, Screening
 
@@ -50,16 +50,18 @@ class Extension:
         self._fitter, self._progress = fitter, progress
         self._first: tuple[CellFit, dict[str, Screening]] | None = None
 
-    def extended(self, parent: CellFit, refit: CellFit, tried: Sequence[str] = ()) -> list[CellFit]:
+    def extended(
+        self, parent: CellFit, steps: Sequence[CellFit], tried: Sequence[str] = ()
+    ) -> list[CellFit]:
         """Return the parent with each promising effect more, best on unseen parts first.
 
         Args:
             parent: the explanation to extend.
-            refit: the fit of the base parameters alone.
+            steps: of the search, the first one the fit of the base parameters alone.
             tried: effects that are left out, since they were tried.
         """
         names, nominal = self.effects, self._fitter.nominal
-        there = {*parent.effects, *tried, *self._one_cause(parent, refit)}
+        there = {*parent.effects, *tried, *self._one_cause(parent, steps)}
         effects = [e for e in names if e not in there]
         effects = founded(effects, parent.effects, nominal, names)
         screened = self.screened(parent, effects)
@@ -83,7 +85,20 @@ class Extension:
             fit = self._fitter.add(parent, effect, begun, _STARTS[later])
             if fit is not None:
                 fits.append(fit)
+        if (sticking := self._sticking(parent, effects)) is not None:
+            fits.append(sticking)
         return self._polished(self.ranked(fits, parent), parent)
+
+    def _sticking(self, parent: CellFit, effects: Sequence[str]) -> CellFit | None:
+        """Return the parent with friction and its bristles, if neither has anything to act on."""
+        friction, bristles = STICKING
+        names, nominal = self.effects, self._fitter.nominal
+        if self._fitter.evidence.slow or friction not in effects or bristles not in names:
+            return None
+        if founded([bristles], parent.effects, nominal, names):
+            return None
+        self._progress(" + ".join((*parent.effects, *STICKING)))
+        return self._fitter.sticking(parent)
 
     def tied(self, chosen: CellFit, fits: Sequence[CellFit], parent: CellFit) -> list[str]:
         """Return the effects that unseen parts cannot tell from the chosen one."""
@@ -114,10 +129,12 @@ class Extension:
         if min(left) < NEARLY_ALL and left_of(self._fitter, repeating[0], parent) > _MOST:
             return nearly_all
         first = repeating[0]
-        worth = self.gain(first, parent).mean
-        alike = [f for f in repeating if f is first or stands_for(self._fitter, f, first, worth)]
+        gained = self.gain(first, parent).mean
+        alike = [f for f in repeating if f is first or stands_for(self._fitter, f, first, gained)]
         laws = [fit.effects for fit in alike]
-        return min(alike, key=lambda fit: plainness(fit.effects, fit.space.effects, laws))
+        worth = [likelihood(self._fitter, fit, parent) for fit in alike]
+        plain = [plainness(fit.effects, fit.space.effects, laws) for fit in alike]
+        return alike[min(range(len(alike)), key=lambda k: (*plain[k], -worth[k]))]
 
     def ranked(self, fits: Sequence[CellFit], parent: CellFit) -> list[CellFit]:
         """Return fits by what they gain over their parent, the best first."""
@@ -190,6 +207,8 @@ class Extension:
             alike: whether it has a near equivalent that leads as well.
         """
         closes_little = left_of(self._fitter, fit, parent) > _OUTDATED
+        added = fit.effects[len(parent.effects) :]
+        alike = alike or any(fx.EFFECTS[effect].of_bare_plant for effect in added)
         if fit.solution.converged and closes_little and not alike:
             return fit
         self._progress(f"{' + '.join(fit.effects)}, further")
@@ -215,23 +234,32 @@ class Extension:
         richer, alone = self._fitter.further(richer), self._fitter.further(fit)
         return richer if self.gain(richer, alone).present else alone
 
-    def _one_cause(self, parent: CellFit, refit: CellFit) -> list[str]:
+    def _one_cause(self, parent: CellFit, steps: Sequence[CellFit]) -> list[str]:
         """Return what could only name a cause of the parent twice; see `ONE_CAUSE`.
 
-        Not where a band is left in which the parent closes little: there another cause acts.
+        A cause that was added to others had but what these left to close.
         """
-        left, gap = self._fitter.misfit(parent) - 1.0, self._fitter.misfit(refit) - 1.0
+        named = []
+        for effect in parent.effects:
+            before = next(fit for fit in reversed(steps) if effect not in fit.effects)
+            if self._closes_nearly_all(parent, before):
+                named.append(effect)
+        return partners(named, set(self.effects), self._fitter.nominal)
+
+    def _closes_nearly_all(self, parent: CellFit, before: CellFit) -> bool:
+        """Tell whether a fit leaves hardly anything of what another left.
+
+        Not where a band is left in which it closes little: there another cause acts.
+        """
+        left, gap = self._fitter.misfit(parent) - 1.0, self._fitter.misfit(before) - 1.0
         if not left < ONE_CAUSE * gap:
-            return []
+            return False
         weights = self._fitter.weights
-        over = [fit.left / weights.select_floor - 1.0 for fit in (parent, refit)]
+        over = [fit.left / weights.select_floor - 1.0 for fit in (parent, before)]
         bands = [
             np.sum(weights.counts * each, axis=0) / weights.counts.sum(axis=0) for each in over
         ]
-        open_bands = (bands[0] > NOTHING_LEFT) & (bands[0] > _MOST * bands[1])
-        if open_bands.any():
-            return []
-        return partners(parent.effects, set(self.effects), self._fitter.nominal)
+        return not ((bands[0] > NOTHING_LEFT) & (bands[0] > _MOST * bands[1])).any()
 
     def screened(self, parent: CellFit, effects: Sequence[str]) -> dict[str, Screening]:
         """Return screenings beside a fit: of all effects the first time, then of those that count.

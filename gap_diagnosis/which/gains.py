@@ -103,6 +103,17 @@ def fall(fitter: CellFitter, fit: CellFit, without: CellFit) -> float:
     return max(float(fitter.weights.numbers(fit.variance) @ ratio), 0.0)
 
 
+def likelihood(fitter: CellFitter, after: CellFit, before: CellFit) -> float:
+    """Return the log-likelihood that one fit gains over another on all parts, fitted and unseen.
+
+    Args:
+        fitter: that made both.
+        after: one of some fits that unseen parts cannot tell apart.
+        before: the fit beside which all of them are seen.
+    """
+    return float(fitter.gains(after, before).sum()) + 0.5 * fall(fitter, after, before)
+
+
 def left_of(fitter: CellFitter, after: CellFit, before: CellFit) -> float:
     """Return how much of the squared error on unseen parts one fit leaves of another's."""
     left = [float(np.sum(fitter.weights.counts * fit.left)) for fit in (after, before)]

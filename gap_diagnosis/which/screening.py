@@ -65,8 +65,9 @@ class Screening:
         errors: Errors,
         costs: Costs,
         largest: float = LARGEST,
+        points: Sequence[tuple[Space, np.ndarray]] = (),
     ) -> None:
-        """Evaluate all seeds once.
+        """Evaluate all seeds and points once.
 
         Args:
             parent: where the parent's fit ended.
@@ -76,15 +77,18 @@ class Screening:
             errors: error vectors of models, as the parent's residuals.
             costs: what error vectors cost.
             largest: the most that a seed is scaled by.
+            points: starting points as they are, each with the space it lies in.
         """
         changes = errors([beside(model, seed) for seed in seeds]) - parent.residuals
         inverse = np.linalg.pinv(parent.jacobian, rcond=1e-6)
+        self._points = as_they_are(points, parent, errors, costs) if points else []
         self._candidates = _candidates(parent, seeds, changes, inverse, costs)
         self._seeds, self._changes = seeds, changes
         self._plain = costs(parent.residuals + changes)
         begun = float(costs(parent.residuals[None])[0])
         self._tries = _Tries(parent, model, inverse, space_of, errors, costs, largest)
-        self.gain = max(self._candidates[0].gain, begun - float(self._plain.min()))
+        least = min(float(self._plain.min()), *(cost for cost, *_ in self._points[:1]), np.inf)
+        self.gain = max(self._candidates[0].gain, begun - least)
 
     def gain_beside(self, other: Solution, ratio: np.ndarray, costs: Costs) -> float:
         """Return what `gain` would be beside another fit, if the seeds changed the motion alike.
@@ -109,7 +113,7 @@ class Screening:
             self._tries.run([(c, 1.0) for c in combined], "kept")
             order = np.argsort(self._plain, kind="stable")[:_TRIED]
             self._tries.add([(self._seeds[k], self._changes[k]) for k in order], self._plain[order])
-        return self._tries.proposals()[0][0]
+        return self._all()[0][0]
 
     def proposals(self) -> list[Proposal]:
         """Return starting points, tried at several more sizes, the most promising first.
@@ -121,7 +125,33 @@ class Screening:
         best = self._tries.best(_SCALED)
         self._tries.run([(c, c.size * factor) for c in best for factor in _SIZES])
         self._tries.run_straightened(best)
-        return self._tries.proposals()
+        return self._all()
+
+    def _all(self) -> list[Proposal]:
+        return sorted([*self._tries.proposals(), *self._points], key=lambda one: one[0])
+
+
+def as_they_are(
+    points: Sequence[tuple[Space, np.ndarray]], parent: Solution, errors: Errors, costs: Costs
+) -> list[Proposal]:
+    """Return points as they are and with the parent's parameters following, ascending in cost.
+
+    Args:
+        points: each with the space it lies in, at least one.
+        parent: where the parent's fit ended.
+        errors: error vectors of models, as the parent's residuals.
+        costs: what error vectors cost.
+    """
+    inverse = np.linalg.pinv(parent.jacobian, rcond=1e-6)
+    residuals = errors([space.model(point) for space, point in points])
+    followed = []
+    for (space, point), left in zip(points, residuals, strict=True):
+        step = np.zeros(point.size)
+        step[: len(inverse)] = np.clip(inverse @ -left, -_FOLLOW, _FOLLOW)
+        followed.append((space, np.clip(point + step, *space.bounds())))
+    residuals = np.vstack([residuals, errors([space.model(point) for space, point in followed])])
+    tried = zip(costs(residuals).tolist(), [*points, *followed], strict=True)
+    return sorted(((cost, *one) for cost, one in tried), key=lambda one: one[0])
 
 
 class _Tries:

@@ -1,15 +1,17 @@
-"""Ripples and loads that are seen along the recorded motion, in the torque that the model lacks.
+"""Ripples, loads and frictions, seen along the recorded motion in the torque that the model lacks.
 
 A ripple that holds a motor at rest, or decides where it stops, moves it far from where the model
 without it goes; what it does cannot be predicted along the model's motion. Nor can a load that the
-integrator of a loop takes over: the motion hardly shows it. But an observer that holds the model to
-the recorded motion says which torque the model lacks at each recorded angle: size, number and phase
-follow by least squares, and are starting points as they are.
+integrator of a loop takes over: the motion hardly shows it. Of two laws of friction that a
+datasheet lacks, each fitted alone does what both do, and a fit that begins there seldom gets to
+where both are. But an observer that holds the model to the recorded motion says which torque the
+model lacks at each recorded angle and speed: size, number and phase follow by least squares, and
+are starting points as they are.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -21,9 +23,19 @@ from ..model.rig_model import Model
 LOADS = ("torque_bias", "gravity", "external_spring")
 """Effects whose torque does not depend on the motion but for the angle."""
 
+_LAWS: Mapping[str, Callable[[np.ndarray], np.ndarray]] = {
+    "coulomb_friction.motor_nm": lambda v: -np.sign(v),
+    "viscous_friction.motor_nm_s_rad": lambda v: -v,
+    "quadratic_friction.motor_nm_s2_rad2": lambda v: -v * np.abs(v),
+}
+FRICTIONS = tuple(name.split(".")[0] for name in _LAWS)
+"""Laws of friction whose torque at a velocity is proportional to their size."""
+
 _PER_CROSSOVER = 8.0  # averages in a period of the observer's crossover
 _FASTEST = 1.0  # ripples of a higher frequency, over the crossover, the observer does not follow
-_REST = 0.03  # of the rms velocity: below, friction is whatever holds
+_REST, _SLIDES = 0.03, 0.2
+"""Of the rms velocity: below the one friction is whatever holds; above the other it slides, though
+it yields before."""
 _PEAKS = 2
 _NEARLY, _ALIKE = 0.95, 4  # of the best; how many of those that explain so much
 
@@ -39,7 +51,7 @@ class SeenTorques:
             parts: indices of the fitted parts; what others show is not looked at.
             model: the fit beside which a ripple is looked for.
         """
-        simulator = evidence.simulator
+        simulator, self._model = evidence.simulator, model
         rate, records = evidence.records.sample_rate_hz, evidence.records.records
         self._crossover_hz = simulator.crossover_hz
         every = max(int(rate / (_PER_CROSSOVER * simulator.crossover_hz)), 1)
@@ -54,10 +66,12 @@ class SeenTorques:
             velocity = np.gradient(_averaged(record.position, every)) * rate / every
             signals = [_averaged(s, every) for s in (record.position, record.torque, missing)]
             rows = _averaged(seen.astype(float), every) > 0.5
-            columns.append(np.array([*signals, velocity, np.gradient(velocity)])[:, rows])
+            acceleration = np.gradient(velocity) * rate / every
+            columns.append(np.array([*signals, velocity, acceleration])[:, rows])
         found: np.ndarray = np.concatenate(columns, axis=1)
         self._angle, self._torque, self._missing = found[0], found[1], found[2]
         self._velocity, self._acceleration = found[3], found[4]
+        self._usual_speed = float(np.sqrt(np.mean(self._velocity**2) + 1e-300))
 
     def load(self, effect: str) -> list[dict[str, float]]:
         """Return the starting point of a torque that depends on the angle alone, or on nothing.
@@ -88,6 +102,45 @@ class SeenTorques:
             {"external_spring.stiffness_nm_rad": size, "external_spring.rest_rad": rest[0] / size}
         ]
 
+    def friction(self, effect: str) -> list[Model]:
+        """Return models with a law of friction more: alone, and with those of the fit solved anew.
+
+        Inertia is solved as well, since a fit that lacks friction may have bent it. At rest
+        friction is whatever holds, so only what moves is looked at.
+
+        Args:
+            effect: one of `FRICTIONS`.
+        """
+        own = next(name for name in _LAWS if name.startswith(f"{effect}."))
+        there = [name for name in _LAWS if name != own and self._model.effects.get(name)]
+        groups = [[own], [own, *there]] if there else [[own]]
+        rows = np.abs(self._velocity) > _SLIDES * self._usual_speed
+        if rows.sum() < 4 * _PER_CROSSOVER or not np.isfinite(self._missing).all():
+            return []
+        return [model for names in groups if (model := self._solved(names, rows)) is not None]
+
+    def _solved(self, names: Sequence[str], rows: np.ndarray) -> Model | None:
+        """Return the model with sizes of laws of friction solved; None if one is below zero."""
+        plant, effects = self._model.plant, self._model.effects
+        velocity = self._velocity[rows]
+        follow = [n for n in _LAWS if n not in names and plant.get(fx.parameter(n).adds_to)]
+        columns = [
+            -self._acceleration[rows],
+            *(_LAWS[name](velocity) for name in (*names, *follow)),
+        ]
+        columns += [np.ones(velocity.size), self._angle[rows]]
+        scales = [float(np.sqrt(np.mean(column**2))) or 1.0 for column in columns]
+        scaled = np.array(columns).T / scales
+        inertia, *sizes = (
+            np.linalg.lstsq(scaled, self._missing[rows], rcond=1e-9)[0] / scales
+        ).tolist()
+        sizes = {n: effects.get(n, 0.0) + size for n, size in zip(names, sizes, strict=False)}
+        total = plant["jm"] + plant.get("j", 0.0)
+        if min(sizes.values()) <= 0.0 or not total + inertia > 0.0:
+            return None
+        masses = {n: plant[n] * (1.0 + inertia / total) for n in ("jm", "j") if n in plant}
+        return Model({**plant, **masses}, {**effects, **sizes})
+
     def seeds(self, effect: str, tried: np.ndarray) -> list[dict[str, float]]:
         """Return starting points of a ripple, by full parameter names.
 
@@ -97,8 +150,7 @@ class SeenTorques:
         """
         factor = self._factor(effect)
         fastest = 2.0 * np.pi * self._crossover_hz * _FASTEST
-        speed = float(np.sqrt(np.mean(self._velocity**2)))
-        tried = tried[tried * speed < fastest]
+        tried = tried[tried * self._usual_speed < fastest]
         if factor is None or tried.size < 3 or not np.isfinite(self._missing).all():
             return []
         rows = factor != 0.0
@@ -124,7 +176,7 @@ class SeenTorques:
         if entry.acts_on == "transmission" or not entry.ripple:
             return None
         if entry.acts_on == "motor":
-            moving = np.abs(self._velocity) > _REST * np.sqrt(np.mean(self._velocity**2) + 1e-300)
+            moving = np.abs(self._velocity) > _REST * self._usual_speed
             return np.where(moving, -np.sign(self._velocity), 0.0)
         if not entry.full_parameters[0].unit:  # a share of the torque, not a torque
             return self._torque

@@ -94,14 +94,14 @@ class Stepwise:
         return False
 
     def _singles(self, _: Sequence[CellFit], found: Found) -> list[CellFit]:
-        return self.extension.extended(found.best, found.steps[0])
+        return self.extension.extended(found.best, found.steps)
 
     def _less_promising(self, fits: Sequence[CellFit], found: Found) -> list[CellFit]:
         """Return fits of what promises less, where something great is not found yet."""
         if self._misses(found.best) <= _MUCH:
             return []
         passed = [fit.effects[-1] for fit in fits]
-        return self.extension.extended(found.best, found.steps[0], passed)
+        return self.extension.extended(found.best, found.steps, passed)
 
     def _pairs_of_slow_motion(self, fits: Sequence[CellFit], found: Found) -> list[CellFit]:
         """Return the leading fits with each promising effect more.
@@ -136,9 +136,9 @@ class Stepwise:
         self, fits: Sequence[CellFit], found: Found, tried: Sequence[str] = ()
     ) -> list[CellFit]:
         """Return fits with each promising effect more, best on unseen parts first."""
-        refit = found.steps[0]
-        pairs = [pair for fit in fits for pair in self.extension.extended(fit, refit, tried)]
-        return self.extension.ranked(pairs, refit)
+        steps = found.steps
+        pairs = [pair for fit in fits for pair in self.extension.extended(fit, steps, tried)]
+        return self.extension.ranked(pairs, steps[0])
 
     def _repeating(self, fits: Sequence[CellFit], found: Found) -> CellFit | None:
         """Return what is chosen of the fits that close enough, and keep them all."""

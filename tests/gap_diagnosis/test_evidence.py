@@ -186,7 +186,7 @@ def test_a_leading_fit_is_taken_to_its_end_before_it_is_compared(monkeypatch):
     refit = fitter.refit()
     proposals = fitter.screening(refit, "torque_saturation").proposals()
     assert not fitter.add(refit, "torque_saturation", proposals).solution.converged
-    (fit,) = Stepwise(fitter, ["torque_saturation"]).extension.extended(refit, refit)
+    (fit,) = Stepwise(fitter, ["torque_saturation"]).extension.extended(refit, [refit])
     assert fit.solution.converged
     assert fit.model.effects["torque_saturation.limit_nm"] == pytest.approx(60.0, rel=0.01)
 
