@@ -88,6 +88,13 @@ class Axis:
             drift_per_s=rng.uniform(-0.06, 0.06) / SECONDS,
         )
 
+    def frictions(self) -> tuple[float, float]:
+        """Return Coulomb and viscous friction as the nearest straight line over the speeds."""
+        speed = np.abs(np.concatenate([np.diff(run) for run in self.runs])) * RATE_HZ
+        share = float(np.mean(self.friction_of_runs)) * (1.0 + self.drift_per_s * SECONDS / 2.0)
+        slope = 1.0 - self.bend * float(np.sum(speed**3) / np.sum(speed**2))
+        return self.coulomb * share, self.viscous * share * slope
+
     def simulated(self, run: int) -> tuple[np.ndarray, np.ndarray]:
         """Return position and torque of one run."""
         share = self.friction_of_runs[run]
@@ -184,7 +191,7 @@ def main() -> None:
             found = diagnose(case / "bags", read_nominal(case / "nominal.yaml"))
             spent = time.process_time() - begun
         shown, inside = [], []
-        for name, true in zip(FRICTIONS, (axis.coulomb, axis.viscous), strict=True):
+        for name, true in zip(FRICTIONS, axis.frictions(), strict=True):
             parameter = found.parameters.get(name)
             shown.append("-" if parameter is None else f"{parameter.value / true:.2f}")
             if parameter is not None:

@@ -63,7 +63,8 @@ def kept(
     """
     if len(fitter.evidence.parts_for("select")) < FEWEST_PARTS:
         return replace(found, steps=found.steps[:1]), []
-    steps, tested, notes = list(found.steps), [], list(found.notes)
+    steps, notes = list(found.steps), list(found.notes)
+    tested: list[Tested] = []
     if not steps[-1].solution.converged:
         steps[-1] = fitter.further(steps[-1])
     replaced: set[str] = set()
