@@ -269,8 +269,9 @@ def _tied(fitter: CellFitter, found: Found, tested: Tested, names: Sequence[str]
 def _notes(evidence: Evidence, found: Found) -> list[str]:
     if evidence.slow:
         return _notes_of_fit(found)
-    notes = list(evidence.simulator.loop.notes)
-    if not evidence.simulator.loop.commanded:  # a controller that makes the torque has its sign
+    loop, player = evidence.player.loop, evidence.player
+    notes = list(loop.notes)
+    if not loop.commanded:  # a controller that makes the torque has its sign
         doubted = [(r.name, wrong_sign(r.torque, r.position)) for r in evidence.records.records]
         notes += [f"{name}: {doubt}." for name, doubt in doubted if doubt is not None][:_SHOWN]
     step = evidence.noise.step_rad
@@ -283,15 +284,9 @@ def _notes(evidence: Evidence, found: Found) -> list[str]:
             "The noise of the position is not known: no repeats, no standstill, and the highest "
             "lines are not flat; so nothing is said of significance."
         )
-    laws = evidence.simulator.loop.laws
-    if None in laws:
-        where = "" if not any(laws) else f" for {laws.count(None)} of {len(laws)} runs"
-        notes.append(
-            f"The loop is not known{where}, so there the recorded torque drives the model and an "
-            f"observer of {evidence.simulator.crossover_hz:.3g} Hz holds it to the recorded "
-            "position: below that, errors show smaller than they are, and the figures of the "
-            "torque are those of what the observer adds."
-        )
+    if None in loop.laws:
+        where = f" for {loop.laws.count(None)} of {len(loop.laws)} runs" if any(loop.laws) else ""
+        notes.append(f"The loop is not known{where}, so there {player.driven}{player.loses}.")
     return [*notes, *_notes_of_fit(found)]
 
 

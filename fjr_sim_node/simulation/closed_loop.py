@@ -10,6 +10,7 @@ for else a drive that lets little through would be explained best of all.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -22,8 +23,10 @@ from fjr_interface.topics import Signal
 from fjr_kit.compiled import jit
 from fjr_kit.errors import InputError
 
+from ..plant import PLANT
 from . import rig
 
+_LINK_INERTIA = PLANT.names.index("j")
 _NOTHING = np.empty(0)
 
 
@@ -171,6 +174,7 @@ def simulate_law(
     command: np.ndarray | None = None,
     added: np.ndarray | None = None,
     start: tuple[float, float] = (0.0, 0.0),
+    held_at: float | None = None,
     controller_state: np.ndarray | None = None,
     begin: State | None = None,
     substeps: int = 1,
@@ -189,7 +193,8 @@ def simulate_law(
             observer whose torque no delay holds up; None where the law makes the command.
         added: torque that a controller commands beside its law, (samples,) in N m; None for none.
         start: position (rad) and velocity (rad/s) that the encoder reads at the first sample, all
-            bodies moving as one.
+            bodies moving as one, but for a link that is held.
+        held_at: where that is held (rad); None for the position at the start.
         controller_state: state of the law before it, such as the `entering_state` of a record;
             None for zero.
         begin: where the simulation begins, whatever the three say; None for what they say.
@@ -201,6 +206,8 @@ def simulate_law(
     if begin is None:
         begin = State.at_rest(controller, elapsed_s)
         rig.move(begin.rig, *rig.under_reading(*start, effects))
+        if math.isinf(plant_coefficients[_LINK_INERTIA]):
+            rig.hold_link(begin.rig, held_at)
         if controller_state is not None:
             begin.law[:-1] = _of_length(
                 controller_state, controller.states, "controller_state", "states"

@@ -43,6 +43,11 @@ def move(state: np.ndarray, position: float, velocity: float) -> None:
     state[_SLACK] = position
 
 
+def hold_link(state: np.ndarray, position: float | None) -> None:
+    """Let a link rest at a position (rad), where it is if that is None."""
+    state[LINK : LINK + 2] = state[LINK] if position is None else position, 0.0
+
+
 def under_reading(reading: float, rate: float, e: np.ndarray | None) -> tuple[float, float]:
     """Return motor position (rad) and velocity (rad/s) at which the encoder reads something.
 

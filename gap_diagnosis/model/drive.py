@@ -23,6 +23,7 @@ class Drive:
         start: position (rad) and velocity (rad/s) that the encoder reads at the first sample.
         entry: state of the law before it; None for zero.
         elapsed_s: time since the first run began, for what drifts.
+        held_at: where a link is held (rad); None for the position at the start.
         begin: state in which the simulation begins, whatever start and entry say.
     """
 
@@ -33,6 +34,7 @@ class Drive:
     entry: np.ndarray | None = None
     elapsed_s: float = 0.0
     added: np.ndarray | None = None
+    held_at: float | None = None
     begin: State | None = None
 
     @property
@@ -60,8 +62,8 @@ class Drive:
         """
         return simulate_law(
             self.reference, sample_rate_hz, p, self.law, noise, e, self.elapsed_s,
-            command=self.command, added=self.added, start=self.start, controller_state=self.entry,
-            begin=self.begin,
+            command=self.command, added=self.added, start=self.start, held_at=self.held_at,
+            controller_state=self.entry, begin=self.begin,
         )  # fmt: skip
 
     def part(self, samples: slice, begin: State | None = None) -> Drive:

@@ -33,6 +33,7 @@ _HIGHEST = 0.05  # of the sample rate
 _STEP, _MOST_STEPS = 2.0**0.25, 16
 _MOST_SENSITIVE = 2.5
 _LEAST_DECAY = 0.003  # of a motion of the loop, per radian of the crossover
+_FORGOTTEN = 20.0  # time constants after which it is forgotten how a model began
 _NEAR = 1.5  # lines within this factor of the crossover give the plant's gain there
 
 
@@ -107,6 +108,20 @@ def model_observer(
             return crossover, law
         growths[growth] = crossover, law
     return growths[min(growths)]
+
+
+def settles(nominal: Mapping[str, float], seconds: float) -> bool:
+    """Tell whether the linear nominal model comes to rest where it began, and soon.
+
+    As a motor does that a held link springs back: then the recorded torque alone makes its motion,
+    and an observer would only lend it stiffness. Others stay wherever a torque has brought them.
+
+    Args:
+        nominal: datasheet values by the names of PLANT.
+        seconds: within which it is forgotten how the model began.
+    """
+    slowest = float(np.linalg.eigvals(linear.motor_side(nominal)[0]).real.max())
+    return slowest * seconds < -_FORGOTTEN
 
 
 def _growth(law: TransferFunction, nominal: Mapping[str, float], sample_rate_hz: float) -> float:

@@ -1,16 +1,19 @@
 """The simulated rig under recorded runs that do not repeat: each is played from its true start.
 
 Where controller and references are known, the loop itself is simulated. Else the recorded torque
-drives the model, and an observer holds its motion to the recorded position (`prediction`).
+drives the model, and an observer holds its motion to the recorded position (`prediction`), unless
+the model comes to rest by itself.
 """
 
 from __future__ import annotations
 
 import copy
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
+from controller_node.transfer_function import TransferFunction
 from fjr_kit.errors import InputError
 from fjr_records.record_noise import RecordNoise
 from fjr_records.records import RecordSet
@@ -18,9 +21,9 @@ from fjr_sim_node.simulation import rig
 from fjr_sim_node.simulation.closed_loop import State
 
 from .drive import Drive
-from .prediction import CROSSOVER_SHARE, model_observer
+from .prediction import CROSSOVER_SHARE, model_observer, settles
 from .record_loop import RecordLoop, loop_of, without_erratic, without_swinging
-from .record_start import start_of
+from .record_start import held_at, start_of
 from .rig_model import Model, too_stiff
 from .simulated_rig import run_parallel
 from .steady_runs import SteadyRuns
@@ -31,6 +34,7 @@ _SETTLED = (1e-6, 1e-4)
 of a line, for a tail that lies in one line must not count there."""
 _BENT = {"jm": 1.1, "j": 1.1, "fs": 1.2, "fsm": 1.2, "fv": 1.2, "fvm": 1.2, "k0": 0.9}
 """Factors on the parameters of a model that must forget the state of the one it begins near."""
+_NOTHING = TransferFunction.of([0.0], [1.0])
 _FORGOTTEN = 3.0  # times what may be left of a transient
 _SLOWER = 1.5  # times as long as it took the model that is simulated first
 
@@ -42,6 +46,8 @@ class RecordSimulator:
         records: what is played.
         loop: how the loop is known.
         crossover_hz: crossover of the observer.
+        settles: whether models come to rest by themselves, so that the recorded torque alone drives
+            them where the loop is not known.
     """
 
     def __init__(
@@ -64,17 +70,43 @@ class RecordSimulator:
         self._named = False
         self.loop: RecordLoop = without_swinging(loop_of(records), records)
         self._starts = [start_of(r, noise) for r in records.records]
+        self._held_at = [
+            held_at(r, start, nominal)
+            for r, start in zip(records.records, self._starts, strict=True)
+        ]
         self._speeds = [float(np.std(np.diff(r.position)) * self._rate) for r in records.records]
         self._torques = [float(np.abs(r.torque).max()) for r in records.records]
         self.crossover_hz, self._observer = model_observer(
             nominal, CROSSOVER_SHARE * top_hz, self._rate
         )
+        shortest = min(r.samples for r in records.records)
+        self.settles = settles(nominal, shortest / self._rate)
         self._entries = [self._entry(index) for index in range(len(records.records))]
         names = [r.name for r in records.records]
         self._begins: dict[int, tuple[int, State]] = {}
         self.loop = without_erratic(self.loop, names, self._growth(Model.nominal(nominal)))
         if isinstance(records, SteadyRuns):
             self._begins = self._near_steady(Model.nominal(nominal), records.run_in, noise)
+
+    @property
+    def driven(self) -> str:
+        """How the recorded torque makes the motion where the loop is not known, in words."""
+        if self.settles:
+            return "the recorded torque alone drives the model, which comes to rest by itself"
+        return (
+            "the recorded torque drives the model, and an observer of "
+            f"{self.crossover_hz:.3g} Hz holds it to the recorded position"
+        )
+
+    @property
+    def loses(self) -> str:
+        """What errors do not show where the loop is not known, in words that end a sentence."""
+        if self.settles:
+            return ": the torque shows no error"
+        return (
+            ": below that, errors show smaller than they are, and the figures of the torque are "
+            "those of what the observer adds"
+        )
 
     def adding(self, signals: Sequence[np.ndarray] | None) -> RecordSimulator:
         """Return a simulator that adds signals to y, u and q of models whose encoder is smooth.
@@ -185,7 +217,7 @@ class RecordSimulator:
 
     def response(self, frequency_hz: np.ndarray, index: int) -> np.ndarray:
         """Return C_y of what holds a run: its controller, or the observer; complex, N m/rad."""
-        law = self.loop.laws[index] or self._observer
+        law = self.loop.laws[index] or (_NOTHING if self.settles else self._observer)
         return law.response(frequency_hz, self._rate)[1]
 
     def run(self, models: Sequence[Model], which: Sequence[int]) -> list[list[np.ndarray]]:
@@ -224,18 +256,21 @@ class RecordSimulator:
         """Return what drives a simulation of one run."""
         law, record = self.loop.laws[index], self.records.records[index]
         if law is None:
-            return self._observed(index)
+            observed = self._observed(index)
+            return replace(observed, law=_NOTHING) if self.settles else observed
         assert record.reference is not None
         start, entry = self._starts[index], self._entries[index]
         added = self.loop.added[index]
-        return Drive(record.reference, law, None, start, entry, record.elapsed_s, added)
+        held = self._held_at[index]
+        return Drive(record.reference, law, None, start, entry, record.elapsed_s, added, held)
 
     def _observed(self, index: int) -> Drive:
         record = self.records.records[index]
         start = self._starts[index]
         return Drive(
-            record.position, self._observer, record.torque, start, elapsed_s=record.elapsed_s
-        )
+            record.position, self._observer, record.torque, start, elapsed_s=record.elapsed_s,
+            held_at=self._held_at[index],
+        )  # fmt: skip
 
     def disturbed(self, model: Model, index: int, noise: np.ndarray) -> np.ndarray:
         """Return y, u and q of a model in one run, to which nothing is added, with encoder noise.

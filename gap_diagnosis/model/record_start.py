@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
+
 import numpy as np
 
 from fjr_records.record_noise import RecordNoise
@@ -40,6 +43,26 @@ def start_of(record: Record, noise: RecordNoise) -> tuple[float, float]:
     if np.all(np.abs(found[:2]) <= _AT_REST * error[:2]):
         return 0.0, 0.0
     return float(found[0]), float(found[1] / time[-1])
+
+
+def held_at(
+    record: Record, start: tuple[float, float], nominal: Mapping[str, float]
+) -> float | None:
+    """Return where a link is held (rad), from which the encoder need not count.
+
+    A run that begins at rest begins there; one that moves already does so about it. None where no
+    link is held.
+
+    Args:
+        record: the run.
+        start: of it, from `start_of`.
+        nominal: datasheet values by the names of PLANT.
+    """
+    if not math.isinf(nominal["j"]):
+        return None
+    if start[1] == 0.0:
+        return start[0]
+    return float(record.position.mean() - record.torque.mean() / nominal["k0"])
 
 
 def _may_begin_from_rest(first: np.ndarray, std: float) -> bool:

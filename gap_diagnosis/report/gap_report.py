@@ -179,10 +179,7 @@ def _method(fitted: Fitted) -> str:
     simulator = evidence.player
     laws = simulator.loop.laws
     loop = "The closed loop is simulated from the true start of each run."
-    observed = (
-        "the recorded torque drives the model, and an observer of "
-        f"{simulator.crossover_hz:.3g} Hz holds it to the recorded position."
-    )
+    observed = f"{simulator.driven}."
     if None not in laws:
         return loop
     if not any(laws):

@@ -97,7 +97,7 @@ def kept(
         if guessed and _bears(tested, tests):
             bearing.add(weakest.effect)
             continue
-        notes += [*_changing(weakest), *_kin(weakest)]
+        notes += [*_changing(weakest), *_kin(weakest), *_bent(weakest)]
         steps, tested = fewer, tests
     if tested and any(len(fit.effects) != count for count, fit in enumerate(steps)):
         steps = [steps[0], *_one_by_one(fitter, steps[-1], tested)]
@@ -149,6 +149,18 @@ def _kin(tested: Tested) -> list[str]:
         f"{explanation([tested.effect]).capitalize()} would close {tested.share.value:.0%} of what "
         "the refit left, and does so on data that no fit has seen, but most of the error stays, so "
         "it is not named: what is there may be of a law whose nearest kin in the catalogue it is."
+    ]
+
+
+def _bent(tested: Tested) -> list[str]:
+    """Return the sentence on a cause that is not named since its law ended at a limit."""
+    if not tested.of_another_form or not tested.share.value >= _MUCH:
+        return []
+    parameter = fx.parameter(str(tested.bounded))
+    return [
+        f"{explanation([tested.effect]).capitalize()} would close {tested.share.value:.0%} of what "
+        f"the refit left, but its {parameter.name.split('.')[1]} ended where a fit may go no "
+        "further, so it is not named: what is there is akin to it, of another form."
     ]
 
 

@@ -63,7 +63,7 @@ class Tested:
         own_sizes: how much a size of its own at each level would close beyond, of what it closes,
             on unseen parts; 0 where chance explains that sizes differ.
         certain: whether the interval of its size lacks zero.
-        bounded: whether a parameter lies where the fit may go no further.
+        bounded: parameter, by its full name, that lies where the fit may go no further, or None.
         share: how much of what the refit left comes back without it, on unseen parts that select.
         left: how much of that is left with it and all others.
         over_noise: how much of what the refit leaves over noise, all errors counting by theirs, is
@@ -78,7 +78,7 @@ class Tested:
     without: CellFit
     invariance_p: float | None
     certain: bool
-    bounded: bool
+    bounded: str | None
     share: Figure
     left: float
     in_band: float
@@ -97,15 +97,21 @@ class Tested:
         """Whether it passes all tests but that of its own size, which another cause may blur."""
         closes = self._closes
         least = LEAST_PRESENT if self.certain else _UNCERTAIN * LEAST_PRESENT
-        there = self.gain.present and closes and not self.bounded
+        there = self.gain.present and closes and self.bounded is None
         return there and self.invariant and self.present >= least
 
     @property
     def nearest_kin(self) -> bool:
         """Whether it is not called present only because most of the error stays beside it."""
         alone = self.present / self._beside_much
-        passes = self.certain and self.gain.present and self._closes and not self.bounded
+        passes = self.certain and self.gain.present and self._closes and self.bounded is None
         return passes and self.invariant and self.present < LEAST_PRESENT <= alone
+
+    @property
+    def of_another_form(self) -> bool:
+        """Whether it is not called present only because its law ends at a limit of its form."""
+        there = self.certain and self.gain.present and self._closes and self.invariant
+        return there and self.bounded is not None
 
     @property
     def invariant(self) -> bool:
@@ -158,7 +164,7 @@ class Tested:
         )
         sure *= _IF_OF_FORM + (1.0 - _IF_OF_FORM) * float(beyond_form)
         sure *= doubt_of_shape(self.ripples)
-        if not self.certain or self.bounded:
+        if not self.certain or self.bounded is not None:
             sure *= _UNCERTAIN
         if not self.invariant:
             sure *= 0.5

@@ -93,8 +93,8 @@ def beyond_zero(effect: str, found: Mapping[str, Estimate], fall: float) -> bool
     return len(sizes) > 1 and together_sure(fall, len(sizes))
 
 
-def at_its_bound(fit: CellFit, effect: str) -> bool:
-    """Tell whether a parameter of an effect lies where the fit may go no further.
+def at_its_bound(fit: CellFit, effect: str) -> str | None:
+    """Return the parameter of an effect that lies where the fit may go no further; None if none is.
 
     Zero and one are no such bounds: they are what a ratio or a share can be.
     """
@@ -106,8 +106,8 @@ def at_its_bound(fit: CellFit, effect: str) -> bool:
         for end in (low[k], high[k]):
             near = abs(fit.solution.x[k] - end) <= _AT_BOUND * max(abs(end), _AT_BOUND)
             if near and end * unit not in (0.0, 1.0):
-                return True
-    return False
+                return name
+    return None
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,8 @@ class Scales:
         torque_nm: rms torque.
         velocity_rad_s: rms velocity.
         angle_rad: rms of the motion about its mean.
-        deflection_rad: rms torque over k0; the rms motion on a rigid axis.
+        deflection_rad: rms torque over k0; the rms motion on a rigid axis, and before a held link,
+            where it is the deflection.
         period_s: sample period.
         band_hz: highest frequency with signal.
         inertia_kg_m2: motor and link together.
@@ -72,11 +73,12 @@ class Scales:
         span = max(round(sample_rate_hz / (4.0 * band_hz)), 1)
         speeds = [(y[span:] - y[:-span]) * (sample_rate_hz / span) for y in positions]
         torque, angle = _rms(torques), _rms([y - y.mean() for y in positions])
+        flexible = nominal.get("k0") and "j" in nominal
         return cls(
             torque_nm=torque,
             velocity_rad_s=_rms(speeds),
             angle_rad=angle,
-            deflection_rad=torque / nominal["k0"] if nominal.get("k0") else angle,
+            deflection_rad=torque / nominal["k0"] if flexible else angle,
             period_s=1.0 / sample_rate_hz,
             band_hz=band_hz,
             inertia_kg_m2=nominal["jm"] + nominal.get("j", 0.0),

@@ -13,6 +13,7 @@ from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.outcome.diagnosis import Estimate
 from gap_diagnosis.verdict.kept_causes import (
     SURE,
+    _bears,
     _begun_anew,
     _changing,
     _guesses,
@@ -194,13 +195,32 @@ def test_what_closes_little_and_leaves_as_much_may_be_what_another_law_leaves(
 
 def test_of_near_equivalents_the_one_that_closes_little_beside_the_other_names_it_twice(searched):
     fitter, fits = searched
+    best = fits[3]
+    tested = causes_with_tests(fitter, best, fits[0], SCATTER)
+    assert _twice(fitter, best, tested) == []
+    found = next(t for t in tested if t.effect == "delay")
+    much = found.share.model_copy(update={"value": 0.3})
+    alone = replace(found.without, left=1.05 * best.left)  # either does nearly all
+    little = replace(found, share=replace_share(much), without=alone)
+    delay, lag = (replace(little, effect=e) for e in ("delay", "actuator_lag"))
+    assert _twice(fitter, best, [delay, lag]) == [delay, lag]
+    assert _twice(fitter, best, [replace(delay, share=much), lag]) == []
+    # what is little of the gap is much of what both close
+    assert _twice(fitter, best, [delay, replace(lag, without=found.without)]) == []
+
+
+@pytest.mark.parametrize(("present", "bears"), [(0.99, True), (0.7, False)])
+def test_what_is_unsure_stays_if_without_it_a_cause_fails_that_is_sure_beside_it(
+    searched, present, bears
+):
+    fitter, fits = searched
     tested = causes_with_tests(fitter, fits[3], fits[0], SCATTER)
-    assert _twice(tested) == []
-    much = tested[0].share.model_copy(update={"value": 0.3})
-    little = replace_share(much)
-    delay, lag = (replace(tested[0], effect=e, share=little) for e in ("delay", "actuator_lag"))
-    assert _twice([delay, lag]) == [delay, lag]
-    assert _twice([replace(delay, share=much), lag]) == []
+    sure = max(tested, key=lambda t: t.present)
+    failed = replace(sure, certain=False)
+    assert sure.passed and sure.present > 0.8 and not failed.passed
+    beside = sure if present > 0.8 else replace(sure, gain=replace(sure.gain, share=0.6))
+    assert _bears([beside], [failed]) == bears
+    assert not _bears([beside], [sure])
 
 
 def test_what_a_cause_closes_beside_what_others_do_in_its_band(searched):
