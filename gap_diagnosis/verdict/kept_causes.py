@@ -65,7 +65,7 @@ def kept(
         return replace(found, steps=found.steps[:1]), []
     steps, notes = list(found.steps), list(found.notes)
     tested: list[Tested] = []
-    if not steps[-1].solution.converged:
+    if steps[-1].effects:
         steps[-1] = fitter.further(steps[-1])
     replaced: set[str] = set()
     bearing: set[str] = set()
