@@ -17,7 +17,7 @@ from typing import Literal
 import numpy as np
 
 from fjr_records.record_noise import RecordNoise, band_lines, record_noise
-from fjr_records.records import RecordSet
+from fjr_records.records import Record, RecordSet
 
 from .lapped import lapped, samples_of
 from .parts import Purpose, cut, joined, spans_of
@@ -35,6 +35,7 @@ _SLOW_WINDOWS = 96
 _SLIGHT = 0.01  # of the torque: in a slow motion, less of it says nothing
 _SIMULATION = 1e-3  # error of the simulation itself, of its torque or of its motion
 _DIVERGED = 1e6
+_SOFT = 1e-6  # of torque over motion: the gain of a loop that holds next to nothing
 
 
 class Evidence:
@@ -89,7 +90,7 @@ class Evidence:
         frequency = (np.arange(self.lines) + 0.5) * self.line_hz
         self._held = [
             lapped(r.torque, self.hop)[:, : self.lines]
-            / np.maximum(np.abs(self.simulator.response(frequency, i)), 1e-300)
+            / np.maximum(np.abs(self.simulator.response(frequency, i)), _least_held(r))
             for i, r in enumerate(records.records)
         ]
         self.parts = tuple(cut(records, self.hop, run_in))
@@ -296,6 +297,11 @@ class Evidence:
         count = np.bincount(cell, minlength=self.cells)
         total = np.bincount(cell, values**2, self.cells)
         return total / np.maximum(count, 1)
+
+
+def _least_held(record: Record) -> float:
+    """Return the gain of a loop (N m/rad) that holds next to nothing, above zero."""
+    return _SOFT * float(np.std(record.torque) / max(np.std(record.position), 1e-30)) + 1e-300
 
 
 def _edges(lines: int) -> np.ndarray:

@@ -23,7 +23,7 @@ REPORTED: dict[str, str] = {
 CONTROLLER: dict[str, str] = {
     "known": "The controller is known, so the closed loop was simulated.",
     "gains_fitted": "The controller is known but for its gains, which were fitted.",
-    "unknown": "The controller is not known, so an observer held the model to the recorded motion.",
+    "unknown": "The controller is not known, so the recorded torque drove the model.",
 }
 EXCITATION: dict[str, str] = {
     "periodic": "Steady periods were compared.",

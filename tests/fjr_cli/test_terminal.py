@@ -146,7 +146,7 @@ def test_diagnose_says_causes_remainder_and_evidence_of_records_whole(console):
         "19% of the motion remains, 16% of the refit's squared gap.",
         "velocity (a law of friction): 42%",
         "level 1, 3.1 to 16 Hz (4.4 \N{GREEK SMALL LETTER SIGMA})",
-        "The noise is not known", "an observer held the model", "blocks of the records",
+        "The noise is not known", "the recorded torque drove the model", "blocks of the records",
     ):  # fmt: skip
         assert said in text, said
 
