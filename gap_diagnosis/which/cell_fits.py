@@ -1,10 +1,7 @@
-"""Fits beside a remainder: the variance of each cell is what the model itself leaves there.
+"""Where fits of an explanation begin, and which of their starts are pursued.
 
-No model of a real rig leaves noise alone. So the weight of a cell of the evidence is not that of
-noise: it is estimated from what the fit leaves on the fitted parts, and the fit is repeated with it
-(iteratively reweighted least squares, the maximum-likelihood estimate for unknown variances by
-cell). Models are compared by the log-likelihood of parts that no fit has seen. What a cell counts
-for is said in `cell_weights`.
+What an effect promises beside a fit is screened over its usual starts and over those that the
+record itself shows; the best of them are fitted (`reweighted`).
 """
 
 from __future__ import annotations
@@ -19,20 +16,17 @@ from fjr_sim_node import effects as fx
 
 from ..model.evidence import Evidence
 from ..model.rig_model import Model
-from .comparison import NOTHING_LEFT, CellFit, Comparison
+from .comparison import CellFit
 from .from_parts import from_part
-from .least_squares import solve
-from .other_splits import other_splits
+from .reweighted import ReweightedFits
 from .ripples import Ripples
 from .ripples_passed import fewest_cycles
-from .scales import Scales
 from .screening import LARGEST, LARGEST_OF_TORQUES, Proposal, Screening, as_they_are
 from .search_space import Space, space_for, starts
 from .seen_torques import FRICTIONS, LOADS, SeenTorques
 
 STICKING = ("coulomb_friction", "presliding_friction")
 """Friction, and the bristles by which it yields before it slides."""
-_REFIT_ROUNDS = (8, 5, 5)
 _ADDED_ROUNDS = (6, 4)
 _LEAST_PROMISE = 20.0  # a start that gains less than this (twice the nats) is not pursued
 _STARTS = 2
@@ -40,45 +34,15 @@ RIPPLES_TRIED = 3
 DRIFT = "nonstationary"
 _DRIFTS = 0.1  # of friction, until the last run ends: where fits of a drift begin, either way
 _RIVAL = 0.05  # an error: a second start that costs so much more than the first is not pursued
-_FURTHER = 4  # times that a fit is taken further at the most
-_STILL_FALLS = 0.8  # of its misfit
 
 
-class CellFitter(Comparison):
-    """Fits explanations to the evidence of records.
-
-    Attributes:
-        nominal: datasheet values of the base parameters.
-        tolerance: how far one may be off, relative.
-        fit_parts: indices of the parts that it fits.
-        groups: (errors,), the stretch of time of each error of the fit, by its first part.
-        runs: (errors,), the record of each error of the fit.
-    """
+class CellFitter(ReweightedFits):
+    """Extends explanations of records by effects, from the starts that promise most."""
 
     def __init__(self, evidence: Evidence, nominal: Mapping[str, float], tolerance: float) -> None:
         """Prepare."""
-        super().__init__(evidence)
-        self.nominal, self.tolerance = dict(nominal), tolerance
+        super().__init__(evidence, nominal, tolerance)
         self._rippled: tuple[CellFit, tuple[Ripples, SeenTorques]] | None = None
-        self.fit_parts = self.weights.fit_parts
-        self.groups, self.runs = evidence.stretch_of(self.fit_parts), self.weights.runs
-        records = evidence.records
-        self.scales = Scales.of_record(
-            [r.position for r in records.records],
-            [r.torque for r in records.records],
-            records.sample_rate_hz,
-            evidence.band_hz,
-            self.nominal,
-        )
-
-    def refit(self) -> CellFit:
-        """Fit the base parameters alone, from the datasheet."""
-        space = Space(self.nominal, (), (), self.tolerance, self.scales)
-        first = self._begun((), space, space.point(Model(self.nominal, {})))
-        left = first.solution.residuals / self.weights.weight(first.variance)
-        if self.weights.learn(left):
-            first = self.further(first)
-        return first if self.left_in_a_band(first) < NOTHING_LEFT else self._while_it_falls(first)
 
     def screening(self, parent: CellFit, effect: str) -> Screening:
         """Return what the starts of an effect promise beside a fit."""
@@ -136,7 +100,7 @@ class CellFitter(Comparison):
             parent.model,
             seeds,
             partial(self._space, parent),
-            partial(self._residuals, parent.variance),
+            partial(self.residuals, parent.variance),
             partial(self.weights.costs, parent.variance),
             LARGEST_OF_TORQUES if self.evidence.slow else LARGEST,
             points,
@@ -150,7 +114,7 @@ class CellFitter(Comparison):
             fit.model,
             starts(whole, self.scales, None, self.nominal),
             partial(self._space, parent),
-            partial(self._residuals, parent.variance),
+            partial(self.residuals, parent.variance),
             partial(self.weights.costs, parent.variance),
         )
 
@@ -188,7 +152,7 @@ class CellFitter(Comparison):
         proposals = as_they_are(
             [(space, point) for point in points],
             parent.solution,
-            partial(self._residuals, parent.variance),
+            partial(self.residuals, parent.variance),
             partial(self.weights.costs, parent.variance),
         )
         return self.add(parent, bristles, proposals, 1, friction)
@@ -226,7 +190,7 @@ class CellFitter(Comparison):
             ratio = self.weights.weight(variance) / self.weights.weight(parent.variance)
             known = parent.solution.jacobian * ratio[:, None] if len(kept) == 1 else None
             effects = (*parent.effects, *before, effect)
-            fit = self._reweighted(effects, space, point, variance, _ADDED_ROUNDS, known)
+            fit = self.reweighted(effects, space, point, variance, _ADDED_ROUNDS, known)
             if best is None or self.gains(fit, best).sum() > 0.0:
                 best = fit
         return None if best is None else replace(best, acts=self.acted(best, *before, effect))
@@ -238,65 +202,6 @@ class CellFitter(Comparison):
     def begun(self, parent: CellFit) -> float:
         """Return what a fit costs itself, as its proposals do."""
         return float(self.weights.costs(parent.variance, parent.solution.residuals[None])[0])
-
-    def further(self, fit: CellFit) -> CellFit:
-        """Return a fit taken further from where it stands."""
-        known = fit.solution.jacobian
-        ended = self._reweighted(
-            fit.effects, fit.space, fit.solution.x, fit.variance, _REFIT_ROUNDS, known
-        )
-        return replace(ended, acts=fit.acts)
-
-    def to_its_end(self, fit: CellFit) -> CellFit:
-        """Return a fit taken further while what it leaves over noise still falls.
-
-        Weighed by what itself leaves, a fit may stay where it misses much in a cell, which then
-        counts for little. So it is also begun with the weights of noise, and the better one counts.
-        """
-        fit = self._of_other_split(self._while_it_falls(fit))
-        if not self.left_in_a_band(fit) > NOTHING_LEFT:
-            return fit
-        noise = self.weights.floor
-        other = self._reweighted(fit.effects, fit.space, fit.solution.x, noise, _REFIT_ROUNDS)
-        return replace(other, acts=fit.acts) if self.gains(other, fit).sum() > 0.0 else fit
-
-    def _of_other_split(self, fit: CellFit) -> CellFit:
-        """Return a fit, or a better one with another share of inertia behind the transmission."""
-        best = fit
-        if not self.left_in_a_band(fit) > NOTHING_LEFT:
-            return best
-        for effects in other_splits(fit.model.effects):
-            start = fit.space.point(Model(fit.model.plant, effects))
-            start = np.clip(start, *fit.space.bounds())
-            other = replace(self._begun(fit.effects, fit.space, start), acts=fit.acts)
-            if self.gains(other, best).sum() > 0.0:
-                best = self._while_it_falls(other)
-        return best
-
-    def _while_it_falls(self, fit: CellFit) -> CellFit:
-        for _ in range(_FURTHER):
-            before, fit = fit, self.further(fit)
-            if not self.misfit(fit) < _STILL_FALLS * self.misfit(before):
-                break
-        return fit
-
-    def taken_over(self, fit: CellFit) -> CellFit:
-        """Return what the fit of another fitter comes to here, from where it ended there."""
-        return self._begun(fit.effects, fit.space, fit.solution.x)
-
-    def without(self, fit: CellFit, effect: str) -> CellFit:
-        """Return a fit with one effect taken out and all else fitted anew.
-
-        Its weights begin with what is left where the effect is missing: with those of the fit, the
-        cells in which it acts would pull all other parameters away.
-        """
-        names = tuple(n for n in fit.space.effects if not n.startswith(f"{effect}."))
-        units = tuple(
-            u for n, u in zip(fit.space.effects, fit.space.units, strict=True) if n in names
-        )
-        space = replace(fit.space, effects=names, units=units)
-        rest = tuple(e for e in fit.effects if e != effect)
-        return self._begun(rest, space, space.point(fit.model))
 
     def _ripples(self, parent: CellFit) -> tuple[Ripples, SeenTorques]:
         if self._rippled is None or self._rippled[0] is not parent:
@@ -312,37 +217,3 @@ class CellFitter(Comparison):
             effects=parent.space.effects + added.effects,
             units=parent.space.units + added.units,
         )
-
-    def _residuals(self, variance: np.ndarray, models: Sequence[Model]) -> np.ndarray:
-        return self.evidence.errors(models, self.fit_parts) * self.weights.weight(variance)
-
-    def _begun(self, effects: tuple[str, ...], space: Space, start: np.ndarray) -> CellFit:
-        """Return a fit whose weights begin with what its start leaves."""
-        errors = self.evidence.errors([space.model(start)], self.fit_parts)[0]
-        return self._reweighted(effects, space, start, self.weights.variance(errors), _REFIT_ROUNDS)
-
-    def _reweighted(
-        self,
-        effects: tuple[str, ...],
-        space: Space,
-        start: np.ndarray,
-        variance: np.ndarray,
-        rounds: Sequence[int],
-        known: np.ndarray | None = None,
-    ) -> CellFit:
-        x, solution = start, None
-        for steps in rounds:
-
-            def residuals(points: np.ndarray, variance: np.ndarray = variance) -> np.ndarray:
-                return self._residuals(variance, [space.model(point) for point in points])
-
-            solution = solve(residuals, x, *space.bounds(), most_steps=steps, known=known)
-            before = self.weights.weight(variance)
-            errors = solution.residuals / before
-            variance, x = self.weights.variance(errors), solution.x
-            known = solution.jacobian * (self.weights.weight(variance) / before)[:, None]
-        assert solution is not None and known is not None
-        left = errors * self.weights.weight(variance)
-        ended = replace(solution, residuals=left, jacobian=known, cost=float(left @ left))
-        model = space.model(x)
-        return CellFit(effects, space, model, ended, variance, self.left_by(model, variance))

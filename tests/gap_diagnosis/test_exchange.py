@@ -26,7 +26,7 @@ def fitted():
     for effect in ("stribeck_friction_motor", "delay", "torque_bias"):
         _, space, point = fitter.screening(fits[-1], effect).proposals()[0]
         names = (*fits[-1].effects, effect)
-        fits.append(fitter._reweighted(names, space, point, fits[-1].variance, (6, 4)))
+        fits.append(fitter.reweighted(names, space, point, fits[-1].variance, (6, 4)))
     return fitter, fits
 
 

@@ -40,7 +40,7 @@ def searched():
     for effect in ("stribeck_friction_motor", "delay", "torque_bias"):
         proposals = fitter.screening(fits[-1], effect).proposals()
         space, point = proposals[0][1:]
-        begun = fitter._reweighted(
+        begun = fitter.reweighted(
             (*fits[-1].effects, effect), space, point, fits[-1].variance, (6, 4)
         )
         fits.append(begun)

@@ -1,0 +1,173 @@
+"""Fits beside a remainder: the variance of each cell is what the model itself leaves there.
+
+No model of a real rig leaves noise alone. So the weight of a cell of the evidence is not that of
+noise: it is estimated from what the fit leaves on the fitted parts, and the fit is repeated with it
+(iteratively reweighted least squares, the maximum-likelihood estimate for unknown variances by
+cell). Models are compared by the log-likelihood of parts that no fit has seen. What a cell counts
+for is said in `cell_weights`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..model.evidence import Evidence
+from ..model.rig_model import Model
+from .comparison import NOTHING_LEFT, CellFit, Comparison
+from .least_squares import solve
+from .other_splits import other_splits
+from .scales import Scales
+from .search_space import Space
+
+_REFIT_ROUNDS = (8, 5, 5)
+_FURTHER = 4  # times that a fit is taken further at the most
+_STILL_FALLS = 0.8  # of its misfit
+
+
+class ReweightedFits(Comparison):
+    """Fits explanations to the evidence of records, each from a point.
+
+    Attributes:
+        nominal: datasheet values of the base parameters.
+        tolerance: how far one may be off, relative.
+        fit_parts: indices of the parts that are fitted.
+        groups: (errors,), the stretch of time of each error of the fit, by its first part.
+        runs: (errors,), the record of each error of the fit.
+        scales: what is usual in the records.
+    """
+
+    def __init__(self, evidence: Evidence, nominal: Mapping[str, float], tolerance: float) -> None:
+        """Prepare."""
+        super().__init__(evidence)
+        self.nominal, self.tolerance = dict(nominal), tolerance
+        self.fit_parts = self.weights.fit_parts
+        self.groups, self.runs = evidence.stretch_of(self.fit_parts), self.weights.runs
+        records = evidence.records
+        self.scales = Scales.of_record(
+            [r.position for r in records.records],
+            [r.torque for r in records.records],
+            records.sample_rate_hz,
+            evidence.band_hz,
+            self.nominal,
+        )
+
+    def refit(self) -> CellFit:
+        """Fit the base parameters alone, from the datasheet."""
+        space = Space(self.nominal, (), (), self.tolerance, self.scales)
+        first = self._begun((), space, space.point(Model(self.nominal, {})))
+        left = first.solution.residuals / self.weights.weight(first.variance)
+        if self.weights.learn(left):
+            first = self.further(first)
+        return first if self.left_in_a_band(first) < NOTHING_LEFT else self._while_it_falls(first)
+
+    def further(self, fit: CellFit) -> CellFit:
+        """Return a fit taken further from where it stands."""
+        known = fit.solution.jacobian
+        ended = self.reweighted(
+            fit.effects, fit.space, fit.solution.x, fit.variance, _REFIT_ROUNDS, known
+        )
+        return replace(ended, acts=fit.acts)
+
+    def to_its_end(self, fit: CellFit) -> CellFit:
+        """Return a fit taken further while what it leaves over noise still falls.
+
+        Weighed by what itself leaves, a fit may stay where it misses much in a cell, which then
+        counts for little. So it is also begun with the weights of noise, and the better one counts.
+        """
+        fit = self._of_other_split(self._while_it_falls(fit))
+        if not self.left_in_a_band(fit) > NOTHING_LEFT:
+            return fit
+        noise = self.weights.floor
+        other = self.reweighted(fit.effects, fit.space, fit.solution.x, noise, _REFIT_ROUNDS)
+        return replace(other, acts=fit.acts) if self.gains(other, fit).sum() > 0.0 else fit
+
+    def _of_other_split(self, fit: CellFit) -> CellFit:
+        """Return a fit, or a better one with another share of inertia behind the transmission."""
+        best = fit
+        if not self.left_in_a_band(fit) > NOTHING_LEFT:
+            return best
+        for effects in other_splits(fit.model.effects):
+            start = fit.space.point(Model(fit.model.plant, effects))
+            start = np.clip(start, *fit.space.bounds())
+            other = replace(self._begun(fit.effects, fit.space, start), acts=fit.acts)
+            if self.gains(other, best).sum() > 0.0:
+                best = self._while_it_falls(other)
+        return best
+
+    def _while_it_falls(self, fit: CellFit) -> CellFit:
+        for _ in range(_FURTHER):
+            before, fit = fit, self.further(fit)
+            if not self.misfit(fit) < _STILL_FALLS * self.misfit(before):
+                break
+        return fit
+
+    def taken_over(self, fit: CellFit) -> CellFit:
+        """Return what the fit of another fitter comes to here, from where it ended there."""
+        return self._begun(fit.effects, fit.space, fit.solution.x)
+
+    def without(self, fit: CellFit, effect: str) -> CellFit:
+        """Return a fit with one effect taken out and all else fitted anew.
+
+        Its weights begin with what is left where the effect is missing: with those of the fit, the
+        cells in which it acts would pull all other parameters away.
+        """
+        names = tuple(n for n in fit.space.effects if not n.startswith(f"{effect}."))
+        units = tuple(
+            u for n, u in zip(fit.space.effects, fit.space.units, strict=True) if n in names
+        )
+        space = replace(fit.space, effects=names, units=units)
+        rest = tuple(e for e in fit.effects if e != effect)
+        return self._begun(rest, space, space.point(fit.model))
+
+    def residuals(self, variance: np.ndarray, models: Sequence[Model]) -> np.ndarray:
+        """Return the errors of models on the fitted parts, times their weights, (models, errors).
+
+        Args:
+            variance: (cells,), of an error in each cell, rad2.
+            models: the models.
+        """
+        return self.evidence.errors(models, self.fit_parts) * self.weights.weight(variance)
+
+    def _begun(self, effects: tuple[str, ...], space: Space, start: np.ndarray) -> CellFit:
+        """Return a fit whose weights begin with what its start leaves."""
+        errors = self.evidence.errors([space.model(start)], self.fit_parts)[0]
+        return self.reweighted(effects, space, start, self.weights.variance(errors), _REFIT_ROUNDS)
+
+    def reweighted(
+        self,
+        effects: tuple[str, ...],
+        space: Space,
+        start: np.ndarray,
+        variance: np.ndarray,
+        rounds: Sequence[int],
+        known: np.ndarray | None = None,
+    ) -> CellFit:
+        """Return a fit that is repeated with the weights of what it leaves.
+
+        Args:
+            effects: identifiers, in the order in which they were added.
+            space: what is free.
+            start: the point in which it begins.
+            variance: (cells,), of an error in each cell, with which it begins, rad2.
+            rounds: the most steps between one reweighting and the next.
+            known: columns of the Jacobian at the start, see `solve`.
+        """
+        x, solution = start, None
+        for steps in rounds:
+
+            def errors_of(points: np.ndarray, variance: np.ndarray = variance) -> np.ndarray:
+                return self.residuals(variance, [space.model(point) for point in points])
+
+            solution = solve(errors_of, x, *space.bounds(), most_steps=steps, known=known)
+            before = self.weights.weight(variance)
+            errors = solution.residuals / before
+            variance, x = self.weights.variance(errors), solution.x
+            known = solution.jacobian * (self.weights.weight(variance) / before)[:, None]
+        assert solution is not None and known is not None
+        left = errors * self.weights.weight(variance)
+        ended = replace(solution, residuals=left, jacobian=known, cost=float(left @ left))
+        model = space.model(x)
+        return CellFit(effects, space, model, ended, variance, self.left_by(model, variance))
