@@ -166,7 +166,8 @@ def investigate_runs(
         order.nominal, order.tolerance, order.progress, order.search_ends,
     )  # fmt: skip
     model = Model.nominal(nominal)
-    names = catalogue(model.plant, order.effects)
+    linear_axis = any(record.description.linear for record in records.records)
+    names = catalogue(model.plant, order.effects, linear_axis=linear_axis)
     if order.drift and order.effects is None:
         names.append(DRIFT)
     if slow is None:

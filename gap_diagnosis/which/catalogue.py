@@ -10,7 +10,13 @@ from fjr_sim_node import effects as fx
 from .search_space import possible_effects
 
 
-def catalogue(nominal: Mapping[str, float], asked: Sequence[str] | None = None) -> list[str]:
+_OF_AN_ANGLE = ("gravity",)
+"""What depends on the angle of a turn; of a linear axis weight is a constant force."""
+
+
+def catalogue(
+    nominal: Mapping[str, float], asked: Sequence[str] | None = None, *, linear_axis: bool = False
+) -> list[str]:
     """Return the effects that a rig can have, or those of them that were asked for.
 
     A rigid axis has none of transmission and link, and friction is added only where there is none.
@@ -19,6 +25,7 @@ def catalogue(nominal: Mapping[str, float], asked: Sequence[str] | None = None) 
     Args:
         nominal: datasheet values of the base parameters.
         asked: identifiers; None for all.
+        linear_axis: whether the axis does not turn.
 
     Raises:
         InputError: an identifier of no effect, or none that this rig can have.
@@ -28,6 +35,7 @@ def catalogue(nominal: Mapping[str, float], asked: Sequence[str] | None = None) 
         name
         for name in possible_effects(nominal)
         if (name in asked if asked is not None else not fx.EFFECTS[name].on_request)
+        if not (linear_axis and name in _OF_AN_ANGLE)
     ]
     if asked is not None and not found:
         raise InputError(

@@ -304,6 +304,12 @@ def test_a_cubic_stiffness_that_the_nominal_lacks_is_a_cause():
     assert own["k1"] == pytest.approx(case.rig["k1"], rel=0.05)
 
 
+def test_weight_on_a_linear_axis_is_a_constant_force():
+    carriage = {"jm": 95.0, "k0": math.inf}
+    turning, sliding = (set(catalogue(carriage, linear_axis=slides)) for slides in (False, True))
+    assert turning - sliding == {"gravity"} and "torque_bias" in sliding
+
+
 def test_one_side_that_has_friction_is_not_offered_it_again():
     assert "coulomb_friction" not in catalogue(NOMINAL)
     points = starts("coulomb_friction", ANY_SCALES, nominal={**NOMINAL, "fs": 0.0})
