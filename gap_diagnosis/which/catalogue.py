@@ -9,7 +9,6 @@ from fjr_sim_node import effects as fx
 
 from .search_space import possible_effects
 
-
 _OF_AN_ANGLE = ("gravity",)
 """What depends on the angle of a turn; of a linear axis weight is a constant force."""
 
