@@ -2,7 +2,7 @@
 
 Run `python benchmarks/bare_datasheet.py --cases 12 --seed 0`: axes of 1e-3 to 100 kg m2
 with Coulomb and viscous friction, bristles, a constant torque and perhaps cogging, integrated here
-by a law of their own, not by the simulator that the diagnosis fits. A P or PI velocity loop within
+by a law of their own, not by the simulator that the diagnosis fits. A P velocity loop within
 a position loop moves each from place to place in two records, which are imported with the loop
 described (gains unknown) or not at all. With `--remainder` friction also follows no law of the
 catalogue: it bends with speed, differs between directions, drifts within a run and scatters from
