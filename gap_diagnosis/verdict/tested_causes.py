@@ -111,7 +111,8 @@ class Tested:
     def of_another_form(self) -> bool:
         """Whether it is not called present only because its law ends at a limit of its form."""
         there = self.certain and self.gain.present and self._closes and self.invariant
-        return there and self.bounded is not None
+        beside = self.present / _UNCERTAIN >= LEAST_PRESENT
+        return there and beside and self.bounded is not None
 
     @property
     def invariant(self) -> bool:

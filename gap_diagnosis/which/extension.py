@@ -90,7 +90,7 @@ class Extension:
         return self._polished(self.ranked(fits, parent), parent)
 
     def _sticking(self, parent: CellFit, effects: Sequence[str]) -> CellFit | None:
-        """Return the parent with friction and its bristles, if neither has anything to act on."""
+        """Return the parent with friction and its bristles, where there is no friction yet."""
         friction, bristles = STICKING
         names, nominal = self.effects, self._fitter.nominal
         if self._fitter.evidence.slow or friction not in effects or bristles not in names:

@@ -87,7 +87,7 @@ class Screening:
         self._plain = costs(parent.residuals + changes)
         begun = float(costs(parent.residuals[None])[0])
         self._tries = _Tries(parent, model, inverse, space_of, errors, costs, largest)
-        least = min(float(self._plain.min()), *(cost for cost, *_ in self._points[:1]), np.inf)
+        least = min([*self._plain.tolist(), *(cost for cost, *_ in self._points)])
         self.gain = max(self._candidates[0].gain, begun - least)
 
     def gain_beside(self, other: Solution, ratio: np.ndarray, costs: Costs) -> float:

@@ -15,6 +15,7 @@ from gap_diagnosis.verdict.kept_causes import (
     SURE,
     _bears,
     _begun_anew,
+    _bent,
     _changing,
     _guesses,
     _kin,
@@ -221,6 +222,20 @@ def test_what_is_unsure_stays_if_without_it_a_cause_fails_that_is_sure_beside_it
     beside = sure if present > 0.8 else replace(sure, gain=replace(sure.gain, share=0.6))
     assert _bears([beside], [failed]) == bears
     assert not _bears([beside], [sure])
+
+
+def test_a_law_that_ends_at_a_limit_is_told_if_it_would_be_present_without_that(searched):
+    fitter, fits = searched
+    sure = max(causes_with_tests(fitter, fits[3], fits[0], SCATTER), key=lambda t: t.present)
+    much = replace(sure, share=sure.share.model_copy(update={"value": 0.9, "low": 0.8}))
+    ended = replace(much, bounded="hysteresis.displacement_rad", effect="hysteresis")
+    assert not ended.passed and not _bent(much)
+    (note,) = _bent(ended)
+    assert note.startswith("Hysteresis would close 90%") and "displacement_rad ended" in note
+    little = ended.share.model_copy(update={"value": 0.3})
+    assert not _bent(replace(ended, share=little))
+    assert not _bent(replace(ended, in_band=0.0, share=replace_share(little)))
+    assert not _bent(replace(ended, gain=replace(ended.gain, share=0.5)))
 
 
 def test_what_a_cause_closes_beside_what_others_do_in_its_band(searched):
