@@ -68,6 +68,8 @@ class Tested:
         left: how much of that is left with it and all others.
         over_noise: how much of what the refit leaves over noise, all errors counting by theirs, is
             left with it and all others; NaN where noise is not known.
+        over_noise_closed: how much of what stands out of the noise without it, it closes; NaN where
+            noise is not known.
         in_band: how much of what is left without it, it closes where it gains most; see `closed`.
         beside_others: how much of what another cause does it closes there; see `beside_others`.
         ripples: how many of its ripples the motion passes; infinite for what has none.
@@ -86,6 +88,7 @@ class Tested:
     ripples: float = math.inf
     own_sizes: float = 0.0
     over_noise: float = math.nan
+    over_noise_closed: float = math.nan
 
     @property
     def passed(self) -> bool:
@@ -129,7 +132,16 @@ class Tested:
         low, high = self.share.low, self.share.high
         if low is None or not low <= 0.0:  # NaN: one part says nothing
             return True
-        return high is not None and high > 0.0 and self.in_band >= LEAST_IN_BAND
+        return high is not None and high > 0.0 and self._of_left >= LEAST_IN_BAND
+
+    @property
+    def _of_left(self) -> float:
+        """How much of what is left without it, it closes, however that is counted.
+
+        In its best band, or all errors counting by their noise: one part, in which friction
+        scattered, may hold most of the squares even there.
+        """
+        return float(np.fmax(self.in_band, self.over_noise_closed))
 
     @property
     def _beside_much(self) -> float:
@@ -152,10 +164,11 @@ class Tested:
         """
         sure = (1.0 - min(1.0, 5.0 * self.gain.p)) * min(1.0, self.gain.share + 0.1)
         of_all = self.share.low if self.share.low is not None and self.share.low > 0.0 else 0.0
-        closed = max(self.in_band, of_all, 0.0)
+        closed = max(self._of_left, of_all, 0.0)
         sure *= closed / (closed + _DOUBTED * (1.0 - closed))
         share = max(0.0, self.share.value)
         beside_left = share / max(share + self.left, 1e-300)
+        beside_left = float(np.fmax(beside_left, self.over_noise_closed))
         sure *= _IF_NOTHING + (1.0 - _IF_NOTHING) * min(beside_left / _LITTLE, 1.0)
         sure *= self._beside_much
         beyond_form = max(
@@ -188,8 +201,7 @@ def causes_with_tests(
     estimates = cell_estimates(fit, fitter, scatter, fewer)
     squares = [float(ledger.squares(each.model).sum()) for each in (fit, refit)]
     left = squares[0] / max(squares[1], 1e-300)
-    stands_out = [max(fitter.misfit(each) - 1.0, 0.0) for each in (fit, refit)]
-    over_noise = stands_out[0] / stands_out[1] if stands_out[1] > 0.0 else math.nan
+    over_noise = _left_over_noise(fitter, fit, refit)
     found = []
     for effect, without in fewer.items():
         sizes = invariance(fitter, fit, effect, scatter)
@@ -210,9 +222,16 @@ def causes_with_tests(
                 ripples_passed(fit.model, effect, fitter.scales),
                 _own_sizes(ledger, fit, without, sizes),
                 over_noise,
+                1.0 - _left_over_noise(fitter, fit, without),
             )
         )
     return found
+
+
+def _left_over_noise(fitter: CellFitter, after: CellFit, before: CellFit) -> float:
+    """Return how much of what one fit leaves over noise another leaves; NaN where nothing is."""
+    left, whole = (max(fitter.misfit(each) - 1.0, 0.0) for each in (after, before))
+    return left / whole if whole > 0.0 else math.nan
 
 
 def _own_sizes(ledger: Ledger, fit: CellFit, without: CellFit, sizes: Invariance | None) -> float:
