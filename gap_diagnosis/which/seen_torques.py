@@ -105,8 +105,9 @@ class SeenTorques:
     def friction(self, effect: str) -> list[Model]:
         """Return models with a law of friction more: alone, and with those of the fit solved anew.
 
-        Inertia is solved as well, since a fit that lacks friction may have bent it. At rest
-        friction is whatever holds, so only what moves is looked at.
+        First with the inertia solved as well, since a fit that lacks friction may have bent it, then
+        with the fit's, since a motor that play frees from its load now and then seems lighter. At
+        rest friction is whatever holds, so only what moves is looked at.
 
         Args:
             effect: one of `FRICTIONS`.
@@ -117,7 +118,8 @@ class SeenTorques:
         rows = np.abs(self._velocity) > _SLIDES * self._usual_speed
         if rows.sum() < 4 * _PER_CROSSOVER or not np.isfinite(self._missing).all():
             return []
-        return [model for names in groups if (model := self._solved(names, rows)) is not None]
+        found = [model for names in groups if (model := self._solved(names, rows)) is not None]
+        return [*found, *(Model(self._model.plant, model.effects) for model in found)]
 
     def _solved(self, names: Sequence[str], rows: np.ndarray) -> Model | None:
         """Return the model with sizes of laws of friction solved; None if one is below zero."""

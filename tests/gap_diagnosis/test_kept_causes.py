@@ -117,7 +117,7 @@ def test_a_third_cause_must_be_sure(searched):
     tested = causes_with_tests(fitter, fits[3], fits[0], SCATTER)
     gains = [Gain(mean, mean, 1.0, 1e-4) for mean in (30.0, 20.0, 10.0)]
     sure = [replace(t, gain=g, in_band=0.99) for t, g in zip(tested, gains, strict=True)]
-    guess = replace(sure[2], in_band=0.5, share=replace_share(sure[2].share))
+    guess = replace(sure[2], in_band=0.5, over_noise_closed=0.5, share=replace_share(sure[2].share))
     assert guess.present < SURE
     assert _guesses([*sure[:2], guess]) == [guess]
     assert _guesses([guess, replace(sure[0], gain=gains[0])]) == []
@@ -163,7 +163,9 @@ def test_the_nearest_kin_of_what_no_effect_explains_is_told_in_a_note(searched):
     sure = max(causes_with_tests(fitter, fits[3], fits[0], SCATTER), key=lambda t: t.present)
     assert not sure.nearest_kin and _kin(sure) == []
     share = sure.share.model_copy(update={"value": 0.6, "low": 0.5})
-    doubted = replace(sure, share=share, left=0.9, over_noise=0.9, in_band=0.6)
+    doubted = replace(
+        sure, share=share, left=0.9, over_noise=0.9, in_band=0.6, over_noise_closed=0.6
+    )
     assert 0.5 * LEAST_PRESENT < doubted.present < LEAST_PRESENT and doubted.nearest_kin
     (said,) = _kin(doubted)
     assert "60% of what the refit left" in said and "nearest kin" in said
@@ -187,11 +189,37 @@ def test_what_closes_little_and_leaves_as_much_may_be_what_another_law_leaves(
 ):
     fitter, fits = searched
     sure = max(causes_with_tests(fitter, fits[3], fits[0], SCATTER), key=lambda t: t.present)
-    closes = replace(sure, in_band=0.9, left=left, over_noise=0.0, beside_others=beside)
+    closes = replace(
+        sure,
+        in_band=0.9,
+        over_noise_closed=math.nan,
+        left=left,
+        over_noise=0.0,
+        beside_others=beside,
+    )
     little = sure.share.model_copy(update={"value": share, "low": 0.5 * share})
     much = sure.share.model_copy(update={"value": 0.9, "low": 0.5 * share})
     doubted, sure = replace(closes, share=little), replace(closes, share=much)
     assert doubted.present == pytest.approx(factor * sure.present)
+
+
+@pytest.mark.parametrize(
+    ("in_band", "over_noise", "there"),
+    [(0.6, 0.99, True), (0.99, 0.6, True), (0.6, 0.6, False), (0.6, math.nan, False)],
+)
+def test_what_closes_most_of_what_is_left_counts_however_that_is_counted(
+    searched, in_band, over_noise, there
+):
+    fitter, fits = searched
+    sure = max(causes_with_tests(fitter, fits[3], fits[0], SCATTER), key=lambda t: t.present)
+    assert sure.over_noise_closed > 0.9
+    one_part_decides = sure.share.model_copy(update={"value": 3e-4, "low": -1e-4, "high": 8e-4})
+    closes = replace(
+        sure, share=one_part_decides, in_band=in_band, over_noise_closed=over_noise, left=2e-3
+    )
+    assert closes.passed == there
+    beside = replace(closes, beside_others=0.1)
+    assert (beside.present >= SURE) == (over_noise == 0.99)
 
 
 def test_of_near_equivalents_the_one_that_closes_little_beside_the_other_names_it_twice(searched):

@@ -86,7 +86,8 @@ def test_all_friction_and_what_else_is_there_are_named_with_their_sizes(runs):
 def test_friction_and_inertia_are_solved_along_the_recorded_motion(fitter):
     refit = fitter.refit()
     seen = SeenTorques(fitter.evidence, fitter.fit_parts, refit.model)
-    (alone,) = seen.friction("viscous_friction")
+    alone, kept = seen.friction("viscous_friction")
+    assert (kept.effects, kept.plant) == (alone.effects, refit.model.plant)
     assert alone.effects["viscous_friction.motor_nm_s_rad"] > 1.3 * AXIS["fvm"]
     other = {**refit.model.effects, **alone.effects}
     seen = SeenTorques(fitter.evidence, fitter.fit_parts, Model(refit.model.plant, other))
