@@ -105,7 +105,7 @@ class SeenTorques:
     def friction(self, effect: str) -> list[Model]:
         """Return models with a law of friction more: alone, and with those of the fit solved anew.
 
-        First with the inertia solved as well, since a fit that lacks friction may have bent it, then
+        First with the inertia solved, too, since a fit that lacks friction may have bent it, then
         with the fit's, since a motor that play frees from its load now and then seems lighter. At
         rest friction is whatever holds, so only what moves is looked at.
 
