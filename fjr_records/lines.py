@@ -109,3 +109,19 @@ def nearest(lines: np.ndarray, candidates: np.ndarray, count: int) -> np.ndarray
     """
     distance = np.abs(lines[:, None] - candidates[None, :])
     return np.argsort(distance, axis=1, kind="stable")[:, :count]
+
+
+def local_mean(values: np.ndarray, width: int) -> np.ndarray:
+    """Return the mean of each line and its neighbours: what is found from few numbers is rough.
+
+    Args:
+        values: (lines,).
+        width: how many lines are averaged, odd; at the ends those that there are.
+
+    Returns:
+        (lines,).
+    """
+    ahead, window = width // 2, np.ones(width)
+    sums = (np.convolve(each, window) for each in (values, np.ones(values.size)))
+    total, count = (each[ahead : ahead + values.size] for each in sums)
+    return total / count

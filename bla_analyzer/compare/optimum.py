@@ -13,6 +13,8 @@ from typing import Literal
 
 import numpy as np
 
+from fjr_records.lines import local_mean
+
 from ..results.result import BlaEstimate
 from .metrics import LOW_LINES_HZ
 
@@ -43,10 +45,7 @@ def relative_distortion(bla: BlaEstimate, criterion: Criterion = "distortion") -
     relative = (bla.var_nonlinear / np.abs(bla.g) ** 2)[use]
     if criterion == "variance":
         return float(max(relative.mean(), 0.0))
-    window = np.ones(min(3, relative.size))
-    weight = np.convolve(np.ones(relative.size), window, "same")
-    local = np.convolve(relative, window, "same") / weight
-    return float(np.sqrt(np.maximum(local, 0.0)).mean())
+    return float(np.sqrt(np.maximum(local_mean(relative, 3), 0.0)).mean())
 
 
 def least(amplitudes: np.ndarray, values: np.ndarray) -> float:

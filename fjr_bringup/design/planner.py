@@ -16,6 +16,7 @@ import numpy as np
 
 from bla_analyzer.bla.robust import confidence_radius, robust_bla
 from fjr_kit.errors import InputError
+from fjr_records.lines import local_mean
 
 from .measured import MeasuredLevel, read_levels
 
@@ -101,8 +102,8 @@ def pilot_of(level: MeasuredLevel) -> Pilot:
     bla = robust_bla(level.spectra, level.lines.excited)
     relative = 1.0 / np.abs(bla.g) ** 2
     count = bla.realizations
-    nonlinear = _smooth(np.maximum(bla.var_nonlinear, 0.0) * relative)
-    noise = _smooth(bla.var_noise * count * periods * relative)
+    nonlinear = local_mean(np.maximum(bla.var_nonlinear, 0.0) * relative, SMOOTHING)
+    noise = local_mean(bla.var_noise * count * periods * relative, SMOOTHING)
     return Pilot(
         float(np.sqrt(np.mean(level.amplitudes_rad**2))),
         bla.frequency_hz,
@@ -112,12 +113,6 @@ def pilot_of(level: MeasuredLevel) -> Pilot:
         level.grid.sample_rate_hz / level.grid.samples_per_period,
         float(np.sqrt(nonlinear).mean()),
     )
-
-
-def _smooth(values: np.ndarray) -> np.ndarray:
-    window = np.ones(min(SMOOTHING, values.size))
-    weight = np.convolve(np.ones(values.size), window, "same")
-    return np.convolve(values, window, "same") / weight
 
 
 def predicted_error_db(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from typing import Any
 
@@ -35,13 +36,18 @@ def describe(
     records: Sequence[Record],
     levels: int,
     controllers: Sequence[dict[str, Any] | None],
+    must_repeat: bool = False,
 ) -> tuple[list[Description], list[str]]:
     """Describe each record.
+
+    Records that each repeat, but with other periods or lines, are described as records that do
+    not, which one diagnosis takes together.
 
     Args:
         records: level by level, equally many of each.
         levels: how many amplitudes they hold.
         controllers: what is known of the controller, for each record.
+        must_repeat: whether the user says that they repeat in the same way.
 
     Returns:
         Their descriptions, of one kind, and sentences on what differs between them.
@@ -55,7 +61,15 @@ def describe(
     notes: list[str] = []
     found: list[Description] = []
     periodic = all(isinstance(record.repetition, Repetition) for record in records)
-    lines = _common_lines(records, notes) if periodic else None
+    differing = _differing(records, each_level) if periodic else None
+    if differing is not None and must_repeat:
+        raise InputError(f"{differing}; import them into separate folders.")
+    if differing is not None:
+        notes.append(
+            f"{differing}, so all are taken as records that do not repeat; imported into separate "
+            "folders, each gives a BLA by its periods"
+        )
+    lines = _common_lines(records, notes) if periodic and differing is None else None
     axis = {"axis": "linear"} if is_linear(records[0].columns) else {}
     from_speed = records[0].columns["position"].is_speed
     speed = {"position_from": "speed"} if from_speed else {}
@@ -127,25 +141,49 @@ def _check_rates(records: Sequence[Record]) -> None:
             )
 
 
-def _common_lines(records: Sequence[Record], notes: list[str]) -> np.ndarray:
-    """Return the lines that all references excite, and name those that only some of them have."""
-    first = records[0].repetition
-    assert isinstance(first, Repetition)
-    common = first.excited
+def _differing(records: Sequence[Record], each_level: int) -> str | None:
+    """Return what says that two records repeat in different ways; None if none do.
+
+    Args:
+        records: level by level.
+        each_level: how many.
+    """
+    whole = records[0].repetition
+    assert isinstance(whole, Repetition)
+    common = whole.excited
     for record in records[1:]:
         other = record.repetition
         assert isinstance(other, Repetition)
         same = (other.samples_per_period, other.periods) == (
-            first.samples_per_period,
-            first.periods,
+            whole.samples_per_period,
+            whole.periods,
         )
-        shared = np.intersect1d(common, other.excited)
-        if not same or shared.size < 0.9 * max(first.excited.size, other.excited.size):
-            raise InputError(
+        common = np.intersect1d(common, other.excited)
+        if not same or common.size < 0.9 * max(whole.excited.size, other.excited.size):
+            return (
                 f"{records[0].path} and {record.path} differ in period, number of periods or "
-                "excited lines; import them into separate folders."
+                "excited lines"
             )
-        common = shared
+    for number, record in enumerate(records):
+        first = records[number - number % each_level]
+        ratio = _amplitudes(record, common) / _amplitudes(first, common)
+        if np.median(np.abs(ratio / np.median(ratio) - 1.0)) > ODD_LINE:
+            return f"{first.path} and {record.path} differ in the amplitudes of most lines"
+    return None
+
+
+def _amplitudes(record: Record, lines: np.ndarray) -> np.ndarray:
+    assert isinstance(record.repetition, Repetition)
+    return record.repetition.amplitudes[np.isin(record.repetition.excited, lines)]
+
+
+def _common_lines(records: Sequence[Record], notes: list[str]) -> np.ndarray:
+    """Return the lines that all references excite, and name those that only some of them have."""
+    excited = []
+    for record in records:
+        assert isinstance(record.repetition, Repetition)
+        excited.append(record.repetition.excited)
+    common: np.ndarray = functools.reduce(np.intersect1d, excited)
     for record in records:
         assert isinstance(record.repetition, Repetition)
         own = ~np.isin(record.repetition.excited, common)
@@ -162,11 +200,7 @@ def _amplitude(
     records: Sequence[Record], lines: np.ndarray, notes: list[str]
 ) -> float | list[float]:
     """Return the amplitudes of a level, and name lines that differ in one of its records."""
-    rows = []
-    for record in records:
-        assert isinstance(record.repetition, Repetition)
-        rows.append(record.repetition.amplitudes[np.isin(record.repetition.excited, lines)])
-    amplitudes = np.array(rows)
+    amplitudes = np.array([_amplitudes(record, lines) for record in records])
     usual = np.median(amplitudes, axis=0)
     base_hz = records[0].sample_rate_hz / _period(records[0])
     rms = np.sqrt(np.mean(amplitudes**2, axis=1))

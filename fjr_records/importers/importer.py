@@ -20,6 +20,7 @@ from fjr_kit.errors import InputError
 
 from .describe import Description, describe
 from .record_file import ImportOptions, Record, Samples, read_samples, understand
+from .repetition import insists
 
 WRONG_CONTROLLER = 0.5
 """Greatest rms difference of the recorded torque from that of a known law, relative to it."""
@@ -76,7 +77,7 @@ def read_files(files: Sequence[str | Path], options: ImportOptions) -> Understoo
     ]
     for record, controller, source in zip(records, controllers, sources, strict=False):
         _check_controller(record, controller or {}, source)
-    descriptions, notes = describe(records, options.levels, controllers)
+    descriptions, notes = describe(records, options.levels, controllers, insists(options))
     return Understood(tuple(records), tuple(descriptions), tuple(notes))
 
 

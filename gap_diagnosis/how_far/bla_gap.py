@@ -17,7 +17,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from fjr_records.lines import Lines, classify, interpolate_frf
+from fjr_records.lines import Lines, classify, interpolate_frf, local_mean
 from fjr_records.periodic import RecordedExperiment
 from fjr_records.spectra import line_spectrum
 
@@ -26,6 +26,7 @@ from ..outcome.diagnosis import StageFigures
 from .bootstrap import Choice, stage_figures
 
 STAGES = ("nominal", "refit", "explained")
+_SMOOTHED = 7  # lines, since a variance of few realizations is rough
 _SEEN = 3.0  # times its noise that a level must reach to be told from it
 
 _Spectra = tuple[np.ndarray, np.ndarray]
@@ -133,7 +134,7 @@ class _Grid:
         if len(members) < 2:
             return noise
         scatter = (np.abs(y - g * u) ** 2).sum(0) / (len(members) * (len(members) - 1) * power)
-        return np.maximum(_smooth(scatter), np.nan_to_num(noise))
+        return np.maximum(local_mean(scatter, _SMOOTHED), np.nan_to_num(noise))
 
     def _noise(self, index: int, at: np.ndarray) -> np.ndarray:
         """Return the noise power of Y - G U over the mean of the periods, (lines,); NaN for one."""
@@ -143,7 +144,7 @@ class _Grid:
             return np.full(at.size, np.nan)
         left = y[:, at] - self._response((y.mean(0), u.mean(0)), at) * u[:, at]
         scatter = (np.abs(left - left.mean(0)) ** 2).sum(0) / (len(y) * (len(y) - 1))
-        return _smooth(scatter)
+        return local_mean(scatter, _SMOOTHED)
 
     def _response(self, spectra: _Spectra, at: np.ndarray) -> np.ndarray:
         excited = self._lines.excited
@@ -164,10 +165,3 @@ class _Grid:
         """Return the mean power of Yc = Y - G U at lines."""
         yc = spectra[0][at] - self._response(spectra, at) * spectra[1][at]
         return float(np.mean(np.abs(yc) ** 2))
-
-
-def _smooth(power: np.ndarray, half: int = 3) -> np.ndarray:
-    """Average over neighbouring lines: a variance of few realizations is rough."""
-    window = np.ones(2 * half + 1)
-    count = np.convolve(np.ones(power.size), window, "same")
-    return np.convolve(power, window, "same") / count

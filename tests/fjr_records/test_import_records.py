@@ -110,6 +110,29 @@ def test_white_noise_with_an_artificial_reference_is_not_taken_for_periodic(tmp_
     assert shown.exit_code == 2 and not (tmp_path / "out").exists()
 
 
+def test_trajectories_that_each_repeat_in_their_own_way_are_records_of_one_experiment(tmp_path):
+    shapes = np.random.default_rng(5).uniform(0.2, 1.0, (2, 6))
+    angle = 2 * np.pi * np.outer(np.arange(N * 5) / N, np.arange(1, 7))
+    lengths = [multisine(), multisine(1, periods=6)]
+    for number, references in enumerate((lengths, (0.1 * np.cos(angle) @ shapes.T).T)):
+        names = [f"{number}_{letter}" for letter in "ab"]
+        files = [save(tmp_path, n, loop(r)) for n, r in zip(names, references, strict=True)]
+        understood = read_files(files, options())
+        assert all(isinstance(each, RecordDescription) for each in understood.descriptions)
+        (said,) = [note for note in understood.notes if "separate folders" in note]
+        assert "differ in" in said and "taken as records that do not repeat" in said
+        with pytest.raises(InputError, match="differ in .*; import them into separate folders"):
+            read_files(files, options(samples_per_period=N))
+
+
+def test_one_reference_at_two_amplitudes_is_refused_with_the_word_that_tells_levels(tmp_path):
+    sizes = [("a", 0.01), ("b", 0.02)]
+    files = [save(tmp_path, name, loop(multisine(amplitude=size))) for name, size in sizes]
+    with pytest.raises(InputError, match="say how many levels the files hold"):
+        read_files(files, options())
+    assert all(isinstance(d, Experiment) for d in read_files(files, options(levels=2)).descriptions)
+
+
 @pytest.mark.parametrize("excitation", [noise_reference, multisine])
 def test_the_reference_of_another_run_is_refused(tmp_path, excitation):
     values = loop(excitation(0))

@@ -371,7 +371,7 @@ def test_files_must_belong_together_and_the_folder_be_new(tmp_path):
     np.savez(tmp_path / "b.npz", **record(seed=1, periods=5))
     files = [tmp_path / "a.npz", tmp_path / "b.npz"]
     with pytest.raises(InputError, match=r"a\.npz and .*b\.npz differ in .* number of periods"):
-        import_files(files, tmp_path / "out", options())
+        import_files(files, tmp_path / "out", options(samples_per_period=N))
     with pytest.raises(InputError, match=r"c\.npz: there is no such file"):
         import_files([files[0], tmp_path / "c.npz"], tmp_path / "out", options())
     (tmp_path / "out").mkdir()

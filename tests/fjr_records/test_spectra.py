@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import simulated_loop as loop
 
-from fjr_records.lines import classify, interpolate_frf, nearest
+from fjr_records.lines import classify, interpolate_frf, local_mean, nearest
 from fjr_records.spectra import PeriodSums, line_spectrum
 
 
@@ -109,3 +109,10 @@ def test_the_simulated_loop_is_the_linear_loop_without_cubic_term():
     z, h = np.exp(2j * np.pi * k / 512), 1 / loop.RATE_HZ
     g = h**2 * z / ((z - 1) * (z - 1 + 12.0 * h) + 100.0 * h**2 * z)
     np.testing.assert_allclose(y / u, g, rtol=1e-8)
+
+
+@pytest.mark.parametrize("lines", [1, 2, 4, 7, 20])
+def test_a_local_mean_has_as_many_lines_and_takes_the_neighbours_that_there_are(lines):
+    values = np.random.default_rng(lines).normal(size=lines)
+    near = [values[max(k - 3, 0) : k + 4].mean() for k in range(lines)]
+    np.testing.assert_allclose(local_mean(values, 7), near, rtol=1e-12)
