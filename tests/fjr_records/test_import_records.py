@@ -121,7 +121,7 @@ def test_trajectories_that_each_repeat_in_their_own_way_are_records_of_one_exper
         assert all(isinstance(each, RecordDescription) for each in understood.descriptions)
         (said,) = [note for note in understood.notes if "separate folders" in note]
         assert "differ in" in said and "taken as records that do not repeat" in said
-        with pytest.raises(InputError, match="differ in .*; import them into separate folders"):
+        with pytest.raises(InputError, match=r"differ in .*; import them into separate folders"):
             read_files(files, options(samples_per_period=N))
 
 
