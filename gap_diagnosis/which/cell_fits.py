@@ -137,14 +137,41 @@ class CellFitter(ReweightedFits):
         rests decides over a weak loop: then Coulomb friction alone makes the error no smaller. None
         if no start promises anything.
         """
-        friction, bristles = STICKING
-        added = starts(friction, self.scales, None, self.nominal)[0]
-        shapes = starts(bristles, self.scales, None, self.nominal)
-        space = self._space(parent, {**added, **shapes[0]})
-        seen = self._ripples(parent)[1].friction(friction)
+        models = self._ripples(parent)[1].friction(STICKING[0])
+        return self._jointly(parent, STICKING, models)
+
+    def together(self, parent: CellFit, effects: Sequence[str]) -> list[CellFit]:
+        """Return a parent's explanation with frictions and a load that only together are seen.
+
+        Args:
+            parent: the explanation, of the base parameters alone.
+            effects: identifiers of what may be there.
+        """
+        fits = []
+        for names, model in self._ripples(parent)[1].together(effects):
+            rigid = self._jointly(parent, names, [model])
+            friction, bristles = STICKING
+            if friction in names and bristles in effects:
+                yielding = tuple(
+                    dict.fromkeys(e for n in names for e in (n, bristles if n == friction else n))
+                )
+                fits.append(self._jointly(parent, yielding, [model]))
+            fits.append(rigid)
+        return [fit for fit in fits if fit is not None]
+
+    def _jointly(
+        self, parent: CellFit, effects: Sequence[str], models: Sequence[Model]
+    ) -> CellFit | None:
+        """Return a parent's explanation with several effects more, begun at models that have them.
+
+        Bristles are tried in every usual size. None if no start promises anything.
+        """
+        usual = [starts(effect, self.scales, None, self.nominal) for effect in effects]
+        shapes = usual[effects.index(STICKING[1])] if STICKING[1] in effects else [{}]
+        space = self._space(parent, {n: v for seeds in usual for n, v in seeds[0].items()})
         points = [
             np.clip(space.point(Model(m.plant, {**m.effects, **shape})), *space.bounds())
-            for m in seen
+            for m in models
             for shape in shapes
         ]
         if not points:
@@ -155,7 +182,7 @@ class CellFitter(ReweightedFits):
             partial(self.residuals, parent.variance),
             partial(self.weights.costs, parent.variance),
         )
-        return self.add(parent, bristles, proposals, 1, friction)
+        return self.add(parent, effects[-1], proposals, 1, *effects[:-1])
 
     def add(
         self,

@@ -14,6 +14,7 @@ from .equivalents import ONE_CAUSE, founded, holders, partners, plainness
 from .gains import NEARLY_ALL, Gain, closed, gain, left_of, likelihood, stands_for
 from .harmonics import WORTH_A_HARMONIC, with_second_harmonic
 from .screening import Proposal, Screening
+from .seen_torques import LACKED
 
 _PROPOSED, _FITTED, _STARTS = (7, 5), (5, 3), (2, 1)
 """Effects that are tried at several sizes, those of them that are fitted, and from how many starts:
@@ -87,6 +88,9 @@ class Extension:
                 fits.append(fit)
         if (sticking := self._sticking(parent, effects)) is not None:
             fits.append(sticking)
+        if not parent.effects and not self._fitter.evidence.slow and set(LACKED) & set(effects):
+            self._progress("friction and load together")
+            fits += self._fitter.together(parent, self.effects)
         return self._polished(self.ranked(fits, parent), parent)
 
     def _sticking(self, parent: CellFit, effects: Sequence[str]) -> CellFit | None:
