@@ -138,7 +138,7 @@ class Evidence:
         if not self.noise.known:
             return np.zeros(self.cells)
         if isinstance(self.records, SteadyRuns) and not self.noise.rounds:
-            seen = self._scattered(self.records.scatter)
+            seen = self._scattered(self.player.scattered(self.records.scatter))
             if seen is not None:
                 return np.tile(seen, len(self.records.levels))
         cycles = 0.5 * (np.arange(self.lines) + 0.5) / self.hop
@@ -146,7 +146,7 @@ class Evidence:
         return np.tile(of_band, len(self.records.levels))
 
     def _scattered(self, scatter: Sequence[np.ndarray]) -> np.ndarray | None:
-        """Return the variance in each band by what differs between periods, (bands,).
+        """Return the variance in each band by how errors differ between periods, (bands,).
 
         In a loop noise is not white: the controller answers that of the encoder. None for one
         period, or where periods are equal.

@@ -34,6 +34,7 @@ _STEP, _MOST_STEPS = 2.0**0.25, 16
 _MOST_SENSITIVE = 2.5
 _LEAST_DECAY = 0.003  # of a motion of the loop, per radian of the crossover
 _FORGOTTEN = 20.0  # time constants after which it is forgotten how a model began
+_NEARLY_ZERO = 1e-2  # of the frequency of a period
 _NEAR = 1.5  # lines within this factor of the crossover give the plant's gain there
 
 
@@ -145,6 +146,34 @@ def _robust(law: TransferFunction, nominal: Mapping[str, float], sample_rate_hz:
     plant = linear.g0(nominal, frequency, sample_rate_hz)
     loop = law.response(frequency, sample_rate_hz)[1] * plant
     return bool(np.abs(1.0 + loop).min() >= 1.0 / _MOST_SENSITIVE)
+
+
+def prediction_error(
+    position: np.ndarray,
+    torque: np.ndarray,
+    nominal: Mapping[str, float],
+    observer: TransferFunction,
+    sample_rate_hz: float,
+) -> np.ndarray:
+    """Return the error that the linear nominal model has in repeated signals, which it predicts.
+
+    Args:
+        position: (..., N), rad.
+        torque: (..., N), N m.
+        nominal: datasheet values by the names of PLANT.
+        observer: that holds the model.
+        sample_rate_hz: rate of the samples.
+
+    Returns:
+        (1 + G L)^-1 (y - G u), (..., N) in rad.
+    """
+    samples = position.shape[-1]
+    frequency = np.fft.rfftfreq(samples, 1.0 / sample_rate_hz)
+    frequency[0] = _NEARLY_ZERO * frequency[1]  # a free axis has no gain at zero
+    plant = linear.g0(nominal, frequency, sample_rate_hz)
+    loop = plant * observer.response(frequency, sample_rate_hz)[1]
+    error = (np.fft.rfft(position) - plant * np.fft.rfft(torque)) / (1.0 + loop)
+    return np.fft.irfft(error, samples)
 
 
 def loses(recorded: RecordedExperiment) -> str:

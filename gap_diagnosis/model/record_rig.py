@@ -21,7 +21,7 @@ from fjr_sim_node.simulation import rig
 from fjr_sim_node.simulation.closed_loop import State
 
 from .drive import Drive
-from .prediction import CROSSOVER_SHARE, model_observer, settles
+from .prediction import CROSSOVER_SHARE, model_observer, prediction_error, settles
 from .record_loop import RecordLoop, loop_of, without_erratic, without_swinging
 from .record_start import held_at, start_of
 from .rig_model import Model, too_stiff
@@ -79,6 +79,7 @@ class RecordSimulator:
         self.crossover_hz, self._observer = model_observer(
             nominal, CROSSOVER_SHARE * top_hz, self._rate
         )
+        self._nominal = nominal
         shortest = min(r.samples for r in records.records)
         self.settles = settles(nominal, shortest / self._rate)
         self._entries = [self._entry(index) for index in range(len(records.records))]
@@ -107,6 +108,11 @@ class RecordSimulator:
             ": below that, errors show smaller than they are, and the figures of the torque are "
             "those of what the observer adds"
         )
+
+    @property
+    def _holding(self) -> TransferFunction:
+        """What holds models where the loop is not known."""
+        return _NOTHING if self.settles else self._observer
 
     def adding(self, signals: Sequence[np.ndarray] | None) -> RecordSimulator:
         """Return a simulator that adds signals to y, u and q of models whose encoder is smooth.
@@ -217,8 +223,24 @@ class RecordSimulator:
 
     def response(self, frequency_hz: np.ndarray, index: int) -> np.ndarray:
         """Return C_y of what holds a run: its controller, or the observer; complex, N m/rad."""
-        law = self.loop.laws[index] or (_NOTHING if self.settles else self._observer)
+        law = self.loop.laws[index] or self._holding
         return law.response(frequency_hz, self._rate)[1]
+
+    def scattered(self, scatter: Sequence[np.ndarray]) -> list[np.ndarray]:
+        """Return how errors differ between periods of each run, float64 (differences, N) in rad.
+
+        What makes the periods differ moves a model that the recorded torque drives, too.
+
+        Args:
+            scatter: (2, differences, N) for each run, of position and torque.
+        """
+        found = []
+        for law, (position, torque) in zip(self.loop.laws, scatter, strict=True):
+            if law is None:
+                driving = self._nominal, self._holding, self._rate
+                position = prediction_error(position, torque, *driving)
+            found.append(position)
+        return found
 
     def run(self, models: Sequence[Model], which: Sequence[int]) -> list[list[np.ndarray]]:
         """Return y, u and q of each model in each run.

@@ -31,7 +31,8 @@ class SteadyRuns(RecordSet):
         noise: of the positions in it.
         top_hz: highest frequency that is excited.
         scatter: of each run, what differs between its periods, times what makes of that one draw of
-            the noise of their mean, float64 (differences, N) in rad; empty for one period.
+            the noise of their mean, float64 (2, differences, N): of position in rad, of torque in
+            N m; no differences for one period.
     """
 
     run_in: int = 0
@@ -79,8 +80,8 @@ def _of_mean(noise: RecordNoise, periods: int) -> RecordNoise:
 
 def _scatter(run: RecordedRealization) -> np.ndarray:
     """Return differences between successive periods, of the variance of the noise of their mean."""
-    periods = run.kept(run.position)
-    return np.diff(periods, axis=0) / math.sqrt(2.0 * len(periods))
+    periods = np.array([run.kept(signal) for signal in (run.position, run.torque)])
+    return np.diff(periods, axis=1) / math.sqrt(2.0 * periods.shape[1])
 
 
 def compared(recorded: RecordedExperiment) -> list[int]:
