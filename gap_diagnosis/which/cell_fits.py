@@ -23,7 +23,8 @@ from .ripples import Ripples
 from .ripples_passed import fewest_cycles
 from .screening import LARGEST, LARGEST_OF_TORQUES, Proposal, Screening, as_they_are
 from .search_space import Space, space_for, starts
-from .seen_torques import FRICTIONS, LOADS, SeenTorques
+from .seen_together import LOADS
+from .seen_torques import FRICTIONS, SeenTorques
 
 STICKING = ("coulomb_friction", "presliding_friction")
 """Friction, and the bristles by which it yields before it slides."""

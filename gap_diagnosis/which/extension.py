@@ -14,7 +14,7 @@ from .equivalents import ONE_CAUSE, founded, holders, partners, plainness
 from .gains import NEARLY_ALL, Gain, closed, gain, left_of, likelihood, stands_for
 from .harmonics import WORTH_A_HARMONIC, with_second_harmonic
 from .screening import Proposal, Screening
-from .seen_torques import LACKED
+from .seen_together import LACKED
 
 _PROPOSED, _FITTED, _STARTS = (7, 5), (5, 3), (2, 1)
 """Effects that are tried at several sizes, those of them that are fitted, and from how many starts:

@@ -11,7 +11,7 @@ are starting points as they are.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -19,27 +19,16 @@ from fjr_sim_node import effects as fx
 
 from ..model.evidence import Evidence
 from ..model.rig_model import Model
+from .seen_together import LAWS, Seen, heavier, load_parameters, load_torques, solved
 
-LOADS = ("torque_bias", "gravity", "external_spring")
-"""Effects whose torque does not depend on the motion but for the angle."""
-
-_LAWS: Mapping[str, Callable[[np.ndarray], np.ndarray]] = {
-    "coulomb_friction.motor_nm": lambda v: -np.sign(v),
-    "viscous_friction.motor_nm_s_rad": lambda v: -v,
-    "quadratic_friction.motor_nm_s2_rad2": lambda v: -v * np.abs(v),
-}
-FRICTIONS = tuple(name.split(".")[0] for name in _LAWS)
-"""Laws of friction whose torque at a velocity is proportional to their size."""
+FRICTIONS = tuple(name.split(".")[0] for name in LAWS)
+"""Laws of friction that are seen."""
 
 _PER_CROSSOVER = 8.0  # averages in a period of the observer's crossover
 _FASTEST = 1.0  # ripples of a higher frequency, over the crossover, the observer does not follow
 _REST, _SLIDES = 0.03, 0.2
 """Of the rms velocity: below the one friction is whatever holds; above the other it slides, though
 it yields before."""
-LACKED = ("coulomb_friction", "viscous_friction")
-_NO_WORSE, _NEARLY_AS_WELL = 1.05, 1.3
-"""Squares that are left over those of the best: what explains no more is not needed; a load that
-leaves no more may be what is there."""
 _PEAKS = 2
 _NEARLY, _ALIKE = 0.95, 4  # of the best; how many of those that explain so much
 
@@ -86,63 +75,22 @@ class SeenTorques:
         if self._angle.size < 4 * _PER_CROSSOVER or not np.isfinite(self._missing).all():
             return []
         motion = [self._velocity, np.sign(self._velocity), self._acceleration]
-        (size, *rest), _ = _solved([*_columns(effect, self._angle), *motion], self._missing)
-        seed = _load(effect, size, rest[0])
+        columns = load_torques(effect, self._angle)
+        sizes, _ = solved([*columns, *motion], self._missing)
+        seed = load_parameters(effect, sizes[: len(columns)])
         return [] if seed is None else [seed]
 
     def together(self, effects: Sequence[str]) -> list[tuple[tuple[str, ...], Model]]:
-        """Return frictions and a load that only together explain what is seen, each with a model.
-
-        Of a joint whose datasheet is an inertia alone, friction, gravity and inertia hide each
-        other, as the regression of a rigid robot shows (Gautier, Khalil 1988, IEEE ICRA).
+        """Return frictions and a load that only together explain what is seen; see `Seen`.
 
         Args:
             effects: identifiers of what may be there.
-
-        Returns:
-            Sets of two effects or more, the load last, and the model that has them; first the set
-            that explains most, then those whose load does nearly as well.
         """
         rows = np.abs(self._velocity) > _SLIDES * self._usual_speed
         if rows.sum() < 8 * _PER_CROSSOVER or not np.isfinite(self._missing).all():
             return []
-        laws = [
-            name for name in _LAWS if name.split(".")[0] in LACKED and name.split(".")[0] in effects
-        ]
-        loads = ["", *(load for load in LOADS if load in effects)]
-        left = {load: self._regressed(laws, load, rows)[1] for load in loads}
-        best = min(left, key=lambda load: left[load])
-        plain = next(load for load in loads if left[load] < _NO_WORSE * left[best])
-        laws = [
-            name
-            for name in laws
-            if self._regressed([n for n in laws if n != name], plain, rows)[1]
-            > _NO_WORSE * left[plain]
-        ]
-        others = [load for load in loads if load and left[load] < _NEARLY_AS_WELL * left[plain]]
-        found = []
-        for load in dict.fromkeys([plain, *others] if plain else [plain]):
-            names = (*(name.split(".")[0] for name in laws), *([load] if load else []))
-            model = self._regressed(laws, load, rows)[0]
-            if len(names) > 1 and model is not None:
-                found.append((names, model))
-        return found
-
-    def _regressed(
-        self, laws: Sequence[str], load: str, rows: np.ndarray
-    ) -> tuple[Model | None, float]:
-        """Return the model with some laws and a load, inertia solved, too, and the squares left.
-
-        No model where a size has the wrong sign.
-        """
-        velocity, angle = self._velocity[rows], self._angle[rows]
-        columns = [-self._acceleration[rows], *(_LAWS[name](velocity) for name in laws)]
-        columns += _columns(load, angle)
-        sizes, left = _solved(columns, self._missing[rows])
-        inertia, frictions = sizes[0], dict(zip(laws, sizes[1:], strict=False))
-        seed = _load(load, *[*sizes[1 + len(laws) :], 0.0][:2]) if load else {}
-        model = self._heavier(inertia, {**frictions, **(seed or {})})
-        return None if seed is None or min(frictions.values(), default=1.0) <= 0.0 else model, left
+        signals = (self._angle, self._velocity, self._acceleration, self._missing)
+        return Seen(self._model, *(signal[rows] for signal in signals)).together(effects)
 
     def friction(self, effect: str) -> list[Model]:
         """Return models with a law of friction more: alone, and with those of the fit solved anew.
@@ -154,8 +102,8 @@ class SeenTorques:
         Args:
             effect: one of `FRICTIONS`.
         """
-        own = next(name for name in _LAWS if name.startswith(f"{effect}."))
-        there = [name for name in _LAWS if name != own and self._model.effects.get(name)]
+        own = next(name for name in LAWS if name.startswith(f"{effect}."))
+        there = [name for name in LAWS if name != own and self._model.effects.get(name)]
         groups = [[own], [own, *there]] if there else [[own]]
         rows = np.abs(self._velocity) > _SLIDES * self._usual_speed
         if rows.sum() < 4 * _PER_CROSSOVER or not np.isfinite(self._missing).all():
@@ -167,24 +115,15 @@ class SeenTorques:
         """Return the model with sizes of laws of friction solved; None if one is below zero."""
         plant, effects = self._model.plant, self._model.effects
         velocity = self._velocity[rows]
-        follow = [n for n in _LAWS if n not in names and plant.get(fx.parameter(n).adds_to)]
+        follow = [n for n in LAWS if n not in names and plant.get(fx.parameter(n).adds_to)]
         columns = [
             -self._acceleration[rows],
-            *(_LAWS[name](velocity) for name in (*names, *follow)),
+            *(LAWS[name](velocity) for name in (*names, *follow)),
         ]
         columns += [np.ones(velocity.size), self._angle[rows]]
-        (inertia, *solved), _ = _solved(columns, self._missing[rows])
-        sizes = {n: effects.get(n, 0.0) + size for n, size in zip(names, solved, strict=False)}
-        return None if min(sizes.values()) <= 0.0 else self._heavier(inertia, sizes)
-
-    def _heavier(self, inertia: float, sizes: Mapping[str, float]) -> Model | None:
-        """Return the model with more inertia and with sizes of effects; None if it has none."""
-        plant = self._model.plant
-        total = plant["jm"] + plant.get("j", 0.0)
-        if not total + inertia > 0.0:
-            return None
-        masses = {n: plant[n] * (1.0 + inertia / total) for n in ("jm", "j") if n in plant}
-        return Model({**plant, **masses}, {**self._model.effects, **sizes})
+        (inertia, *added), _ = solved(columns, self._missing[rows])
+        sizes = {n: effects.get(n, 0.0) + size for n, size in zip(names, added, strict=False)}
+        return None if min(sizes.values()) <= 0.0 else heavier(self._model, inertia, sizes)
 
     def seeds(self, effect: str, tried: np.ndarray) -> list[dict[str, float]]:
         """Return starting points of a ripple, by full parameter names.
@@ -226,37 +165,6 @@ class SeenTorques:
         if not entry.full_parameters[0].unit:  # a share of the torque, not a torque
             return self._torque
         return np.ones(self._angle.size)
-
-
-def _columns(load: str, angle: np.ndarray) -> list[np.ndarray]:
-    """Return the torques of a load at angles, for sizes of one; none for no load."""
-    one = np.ones(angle.size)
-    return {
-        "": [],
-        "torque_bias": [one],
-        "gravity": [-np.sin(angle), -np.cos(angle)],
-        "external_spring": [-angle, one],
-    }[load]
-
-
-def _load(effect: str, size: float, other: float) -> dict[str, float] | None:
-    """Return the parameters of a load by sizes of its columns; None for a spring that pushes."""
-    if effect == "torque_bias":
-        return {"torque_bias.torque_nm": size}
-    if effect == "gravity":
-        torque, direction = float(np.hypot(size, other)), float(np.arctan2(other, size))
-        return {"gravity.torque_nm": torque, "gravity.angle_rad": direction}
-    if not size > 0.0:
-        return None
-    return {"external_spring.stiffness_nm_rad": size, "external_spring.rest_rad": other / size}
-
-
-def _solved(columns: Sequence[np.ndarray], torque: np.ndarray) -> tuple[list[float], float]:
-    """Return by least squares how much of each column is in a torque, and the squares left."""
-    scales = [float(np.sqrt(np.mean(column**2))) or 1.0 for column in columns]
-    scaled = np.array(columns).T / scales
-    sizes = np.linalg.lstsq(scaled, torque, rcond=1e-9)[0]
-    return (sizes / scales).tolist(), float(np.sum((torque - scaled @ sizes) ** 2))
 
 
 def _seed(effect: str, cycles: float, sizes: np.ndarray) -> dict[str, float]:

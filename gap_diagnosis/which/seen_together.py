@@ -1,0 +1,148 @@
+"""Frictions, a load and inertia, seen together in the torque that a model lacks along a motion.
+
+Of a joint whose datasheet is an inertia alone these hide each other: each fitted alone does a part
+of what all do. The regression of a rigid robot sees them at once (Gautier, Khalil 1988, IEEE ICRA).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..model.rig_model import Model
+
+LOADS = ("torque_bias", "gravity", "external_spring")
+"""Effects whose torque does not depend on the motion but for the angle, the plainest first."""
+LAWS: Mapping[str, Callable[[np.ndarray], np.ndarray]] = {
+    "coulomb_friction.motor_nm": lambda v: -np.sign(v),
+    "viscous_friction.motor_nm_s_rad": lambda v: -v,
+    "quadratic_friction.motor_nm_s2_rad2": lambda v: -v * np.abs(v),
+}
+"""Laws of friction whose torque at a velocity is proportional to their size."""
+LACKED = ("coulomb_friction", "viscous_friction")
+"""Frictions that a datasheet of inertias lacks."""
+_OF_LOAD = "load_friction.coefficient"
+_NO_WORSE, _NEARLY_AS_WELL = 1.05, 1.3
+"""Squares that are left over those of the best: what explains no more is not needed; a load that
+leaves no more may be what is there."""
+
+
+@dataclass(frozen=True)
+class Seen:
+    """The torque that a model lacks at each angle of a recorded motion, where friction slides.
+
+    Attributes:
+        model: the model.
+        angle, velocity, acceleration: (samples,), of the motor.
+        missing: (samples,), N m.
+    """
+
+    model: Model
+    angle: np.ndarray
+    velocity: np.ndarray
+    acceleration: np.ndarray
+    missing: np.ndarray
+
+    def together(self, effects: Sequence[str]) -> list[tuple[tuple[str, ...], Model]]:
+        """Return what only together explains the torque, each set with a model that has it.
+
+        Args:
+            effects: identifiers of what may be there.
+
+        Returns:
+            Sets of two effects or more, the load last; first the set that explains most, then those
+            whose load does nearly as well.
+        """
+        laws = [name for name in LAWS if _effect(name) in LACKED and _effect(name) in effects]
+        loads = ["", *(load for load in LOADS if load in effects)]
+        left = {load: self._regressed(laws, load)[1] for load in loads}
+        best = min(left.values())
+        plain = next(load for load in loads if left[load] <= _NO_WORSE * best)
+        alike = [load for load in loads if load and left[load] <= _NEARLY_AS_WELL * left[plain]]
+        found = []
+        for load in dict.fromkeys([plain, *alike] if plain else [plain]):
+            needed = self._needed(laws, load, effects)
+            model, names = self._regressed(needed, load)[0], [_effect(name) for name in needed]
+            names += [load] if load else []
+            if len(names) > 1 and model is not None:
+                found.append((tuple(names), model))
+        return found
+
+    def _needed(self, laws: Sequence[str], load: str, effects: Sequence[str]) -> list[str]:
+        """Return the laws, and that of friction under load, without which more is left."""
+        every = [*laws, _OF_LOAD] if load and _effect(_OF_LOAD) in effects else list(laws)
+        least = _NO_WORSE * self._regressed(every, load)[1]
+        return [n for n in every if self._regressed([o for o in every if o != n], load)[1] > least]
+
+    def _regressed(self, laws: Sequence[str], load: str) -> tuple[Model | None, float]:
+        """Return the model with laws and a load, inertia solved, too, and the squares left.
+
+        Friction under load is that of the load which the laws without it leave. No model where a
+        friction or a spring has the wrong sign.
+        """
+        columns = [-self.acceleration, *(LAWS[n](self.velocity) for n in laws if n != _OF_LOAD)]
+        of_load = load_torques(load, self.angle)
+        order = [n for n in laws if n != _OF_LOAD]
+        sizes, left = solved([*columns, *of_load], self.missing)
+        if _OF_LOAD in laws:
+            carried = np.array(of_load).T @ sizes[len(columns) :]
+            columns.append(-np.sign(self.velocity) * np.abs(carried))
+            order.append(_OF_LOAD)
+            sizes, left = solved([*columns, *of_load], self.missing)
+        inertia, *frictions = sizes[: len(columns)]
+        seed = load_parameters(load, sizes[len(columns) :])
+        if seed is None or min(frictions, default=1.0) <= 0.0:
+            return None, left
+        return heavier(
+            self.model, inertia, {**dict(zip(order, frictions, strict=True)), **seed}
+        ), left
+
+
+def load_torques(load: str, angle: np.ndarray) -> list[np.ndarray]:
+    """Return the torques of a load at angles, for sizes of one; none for no load."""
+    one = np.ones(angle.size)
+    return {
+        "": [],
+        "torque_bias": [one],
+        "gravity": [-np.sin(angle), -np.cos(angle)],
+        "external_spring": [-angle, one],
+    }[load]
+
+
+def load_parameters(load: str, sizes: Sequence[float]) -> dict[str, float] | None:
+    """Return the parameters of a load by sizes of its torques; None for a spring that pushes."""
+    if not load:
+        return {}
+    if load == "torque_bias":
+        return {"torque_bias.torque_nm": sizes[0]}
+    size, other = sizes
+    if load == "gravity":
+        torque, direction = float(np.hypot(size, other)), float(np.arctan2(other, size))
+        return {"gravity.torque_nm": torque, "gravity.angle_rad": direction}
+    if not size > 0.0:
+        return None
+    return {"external_spring.stiffness_nm_rad": size, "external_spring.rest_rad": other / size}
+
+
+def solved(columns: Sequence[np.ndarray], torque: np.ndarray) -> tuple[list[float], float]:
+    """Return by least squares how much of each column is in a torque, and the squares left."""
+    scales = [float(np.sqrt(np.mean(column**2))) or 1.0 for column in columns]
+    scaled = np.array(columns).T / scales
+    sizes = np.linalg.lstsq(scaled, torque, rcond=1e-9)[0]
+    return (sizes / scales).tolist(), float(np.sum((torque - scaled @ sizes) ** 2))
+
+
+def heavier(model: Model, inertia: float, sizes: Mapping[str, float]) -> Model | None:
+    """Return a model with more inertia and with sizes of effects; None if no inertia is left."""
+    plant = model.plant
+    total = plant["jm"] + plant.get("j", 0.0)
+    if not total + inertia > 0.0:
+        return None
+    masses = {n: plant[n] * (1.0 + inertia / total) for n in ("jm", "j") if n in plant}
+    return Model({**plant, **masses}, {**model.effects, **sizes})
+
+
+def _effect(parameter: str) -> str:
+    return parameter.split(".")[0]
