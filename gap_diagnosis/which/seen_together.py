@@ -25,8 +25,8 @@ LACKED = ("coulomb_friction", "viscous_friction")
 """Frictions that a datasheet of inertias lacks."""
 _OF_LOAD = "load_friction.coefficient"
 _NO_WORSE, _NEARLY_AS_WELL = 1.05, 1.3
-"""Squares that are left over those of the best: what explains no more is not needed; a load that
-leaves no more may be what is there."""
+"""Squares that are left over those of the best: a friction that explains no more is not needed; a
+load that leaves no more does as well."""
 
 
 @dataclass(frozen=True)
@@ -52,17 +52,17 @@ class Seen:
             effects: identifiers of what may be there.
 
         Returns:
-            Sets of two effects or more, the load last; first the set that explains most, then those
-            whose load does nearly as well.
+            Sets of two effects or more, the load last: the plainest one that does nearly as well as
+            the best, and those as plain; the set that explains most first.
         """
         laws = [name for name in LAWS if _effect(name) in LACKED and _effect(name) in effects]
         loads = ["", *(load for load in LOADS if load in effects)]
         left = {load: self._regressed(laws, load)[1] for load in loads}
-        best = min(left.values())
-        plain = next(load for load in loads if left[load] <= _NO_WORSE * best)
-        alike = [load for load in loads if load and left[load] <= _NEARLY_AS_WELL * left[plain]]
+        alike = [load for load in loads if left[load] <= _NEARLY_AS_WELL * min(left.values())]
+        fewest = min(len(load_torques(load, self.angle)) for load in alike)
+        plain = [load for load in alike if len(load_torques(load, self.angle)) == fewest]
         found = []
-        for load in dict.fromkeys([plain, *alike] if plain else [plain]):
+        for load in sorted(plain, key=lambda load: left[load]):
             needed = self._needed(laws, load, effects)
             model, names = self._regressed(needed, load)[0], [_effect(name) for name in needed]
             names += [load] if load else []
