@@ -66,7 +66,7 @@ def kept(
     steps, notes = list(found.steps), list(found.notes)
     tested: list[Tested] = []
     if steps[-1].effects:
-        steps[-1] = fitter.further(steps[-1])
+        steps[-1] = fitter.settled(steps[-1])
     replaced: set[str] = set()
     bearing: set[str] = set()
 
