@@ -11,6 +11,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
+from fjr_sim_node import effects as fx
+
 from .investigation import Investigation
 from .outcome.diagnosis import Diagnosis
 from .verdict.notes import at_limits
@@ -20,6 +22,7 @@ WIDER, CLOSER = 5.0, 0.2
 """How many tolerances a further look takes for one."""
 _GAIN = "encoder_eccentricity"
 _HALF = 0.5  # of the misfit: what leaves less does clearly better
+_LESS = 0.7  # the same where only friction or stiffness is added that the datasheet lacks
 _ALIKE = 1.2  # times the misfit: what leaves less does about as well
 _COMMON = 0.2  # range of the logarithms of ratios to the datasheet, within which one gain holds all
 
@@ -49,8 +52,8 @@ def says_more(
     """Tell whether a further look explains more, or as much by fewer effects.
 
     All parameters off by one factor are a gain, and no better than one that is named. Nor is a
-    datasheet that is taken for further off and still ends at a limit, or needs more causes besides:
-    then its parameters stand for what no effect explains.
+    datasheet that is taken for further off and still ends at a limit, or needs more causes besides,
+    other than what it lacks itself: then its parameters stand for what no effect explains.
 
     Args:
         other: of the further look.
@@ -62,12 +65,14 @@ def says_more(
     left = [_left(diagnosis) for diagnosis in (second, first)]
     if _GAIN in first.effects and _one_factor(second, nominal):
         return False
-    more_causes = 0 < len(first.effects) < len(second.effects)
+    more_causes = first.effects and len(_beside(first)) < len(_beside(second))
     if times > 1.0 and (more_causes or _ended(other)):
         return False
     if len(second.effects) < len(first.effects):
         return left[0] <= _ALIKE * left[1]
-    return left[0] < _HALF * left[1]
+    adds = set(second.effects) - set(first.effects)
+    lacked = set(first.effects) < set(second.effects) and not adds & set(_beside(second))
+    return left[0] < (_LESS if lacked else _HALF) * left[1]
 
 
 def said(second: Diagnosis, nominal: Mapping[str, float], tolerance: float, times: float) -> str:
@@ -97,6 +102,11 @@ def _ended(found: Investigation) -> bool:
         return False
     best = found.fitted.found.best
     return bool(at_limits(best.space, best.solution.x, best.model.plant))
+
+
+def _beside(diagnosis: Diagnosis) -> list[str]:
+    """Return the causes that are no friction or stiffness which the datasheet lacks."""
+    return [effect for effect in diagnosis.effects if not fx.EFFECTS[effect].of_bare_plant]
 
 
 def _left(diagnosis: Diagnosis) -> float:

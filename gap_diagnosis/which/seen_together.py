@@ -24,6 +24,7 @@ LAWS: Mapping[str, Callable[[np.ndarray], np.ndarray]] = {
 LACKED = ("coulomb_friction", "viscous_friction")
 """Frictions that a datasheet of inertias lacks."""
 _OF_LOAD = "load_friction.coefficient"
+_SLIGHT = 1e-6  # of the squares of the torque: less of it says nothing
 _NO_WORSE, _NEARLY_AS_WELL = 1.05, 1.3
 """Squares that are left over those of the best: a friction that explains no more is not needed; a
 load that leaves no more does as well."""
@@ -91,6 +92,7 @@ class Seen:
             columns.append(-np.sign(self.velocity) * np.abs(carried))
             order.append(_OF_LOAD)
             sizes, left = solved([*columns, *of_load], self.missing)
+        left = max(left, _SLIGHT * float(np.sum(self.missing**2)))
         inertia, *frictions = sizes[: len(columns)]
         seed = load_parameters(load, sizes[len(columns) :])
         if seed is None or min(frictions, default=1.0) <= 0.0:

@@ -75,3 +75,9 @@ def test_a_wider_datasheet_must_not_need_more_causes_nor_end_at_a_limit(case):
     assert says_more(more, first, nominal, CLOSER)
     assert says_more(more, told([], 100.0), nominal, WIDER)
     assert not says_more(told(["delay"], 10.0, at_limit=True), first, nominal, WIDER)
+    # friction that the datasheet lacks is no cause that a wrong datasheet makes up
+    lacking = ["delay", "viscous_friction"]
+    assert says_more(told(lacking, 60.0), first, nominal, WIDER)
+    assert not says_more(told(lacking, 80.0), first, nominal, WIDER)
+    assert not says_more(told(["delay", "torque_bias"], 40.0), first, nominal, WIDER)
+    assert not says_more(told(["torque_bias", "viscous_friction"], 60.0), first, nominal, WIDER)

@@ -10,17 +10,20 @@ from typing import Any
 import numpy as np
 import pytest
 from gap_cases import NOISE_RAD, SHORT, simulate_case
+from scipy.signal import lfilter
 
 from controller_node import pd_filtered
+from controller_node.law import as_transfer_function
 from fjr_records.periodic import RecordedExperiment
 from fjr_sim_node import effects as fx
 from fjr_sim_node.plant import PLANT, coefficients
-from fjr_sim_node.simulation.closed_loop import simulate
+from fjr_sim_node.simulation.closed_loop import simulate, simulate_law
 from gap_diagnosis.any_record import investigate
 from gap_diagnosis.gates.bags_gate import friction_follows_time
 from gap_diagnosis.gates.gate_checks import check_gates
 from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.model.rig_model import Model
+from gap_diagnosis.model.steady_runs import steady_runs
 from gap_diagnosis.outcome.diagnosis import Diagnosis
 from gap_diagnosis.report.gap_output import write_diagnosis
 from gap_diagnosis.steady_periods import NOTHING_NAMED, UNSTEADY
@@ -178,3 +181,39 @@ def test_a_drift_goes_with_the_order_of_the_runs(in_time):
     fit = fitter.add(refit, DRIFT, fitter.screening(refit, DRIFT).proposals())
     assert fit is not None and gain(fitter, fit, refit).present
     assert friction_follows_time(fitter.evidence, refit.variance, refit.model) == in_time
+
+
+def pushed(recorded: RecordedExperiment, truth: Model, rms_nm: float) -> RecordedExperiment:
+    """Return an experiment again, under a slow torque that nobody records, of an unknown loop."""
+    rng, made = np.random.default_rng(2), []
+    law = as_transfer_function(pd_filtered.coefficients(pd_filtered.CONTROLLER.check({})))
+    for r in recorded.realizations:
+        steps = rng.standard_normal(r.position.size)
+        slow = lfilter([1.0], [1.0, -0.99], steps)
+        push = rms_nm * slow / slow.std()
+        rate = r.experiment.sample_rate_hz
+        run = simulate_law(
+            r.reference.ravel(), rate, coefficients(truth.plant), law, added=push,
+            noise=NOISE_RAD * rng.standard_normal(push.size),
+        )  # fmt: skip
+        shape = r.position.shape
+        torque, position = run.torque - push, run.position.reshape(shape)
+        unknown = r.experiment.model_copy(update={"controller": None})
+        made.append(replace(r, experiment=unknown, position=position, torque=torque.reshape(shape)))
+    return RecordedExperiment("pushed", tuple(made))
+
+
+def test_where_the_loop_is_not_known_the_noise_is_that_of_what_the_torque_predicts():
+    """What pushes a rig moves a model that the recorded torque drives as much, not less."""
+    case = simulate_case({}, seed=4, off=0.0, realizations=2, **{**SHORT, "periods": 6})
+    recorded = pushed(case.recorded, case.truth, 1.0)
+    evidence = Evidence(steady_runs(recorded), case.truth.whole_plant)
+    assert evidence.simulator.loop.kind == "unknown"
+    parts = range(len(evidence.parts))
+    left = evidence.mean_squares(evidence.errors([case.truth], parts)[0], parts)
+    ratio = left / evidence.floor(parts)
+    assert 0.5 < np.median(ratio) < 1.5 and ratio.max() < 3.0
+    # by how much the recorded position scatters it would not be
+    scatter = [rows[0] for rows in evidence.records.scatter]
+    seen = np.tile(evidence._scattered(scatter), len(evidence.records.levels))
+    assert (left / seen).max() > 5.0 or (left / seen).min() < 0.2

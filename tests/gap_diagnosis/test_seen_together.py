@@ -1,0 +1,129 @@
+"""Frictions, a load and inertia in the torque that a model lacks along a motion."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fjr_records.importers.import_map import parse_map
+from fjr_records.importers.importer import ImportOptions, import_files
+from gap_diagnosis.any_record import diagnose
+from gap_diagnosis.model.nominal import datasheet
+from gap_diagnosis.model.rig_model import Model
+from gap_diagnosis.which.seen_together import LOADS, Seen, load_parameters, solved
+
+EVERY = ("coulomb_friction", "viscous_friction", "load_friction", *LOADS)
+BARE = Model.nominal(datasheet({"jm": 2.0}, "joint"))
+
+
+def seen(inertia=0.0, coulomb=0.0, viscous=0.0, of_load=0.0, load=None, noise=0.0) -> Seen:
+    """Return what is seen of a joint that has more than the bare model; the load by its angle."""
+    stamps = np.arange(4000) / 100.0
+    angle = 1.2 * np.sin(0.9 * stamps) + 0.5 * np.sin(2.3 * stamps + 1.0)
+    velocity, acceleration = np.gradient(angle) * 100.0, np.gradient(np.gradient(angle)) * 1e4
+    rows = np.abs(velocity) > 0.2
+    angle, velocity, acceleration = angle[rows], velocity[rows], acceleration[rows]
+    carried = np.zeros(angle.size) if load is None else load(angle)
+    friction = (coulomb + of_load * np.abs(carried)) * np.sign(velocity) + viscous * velocity
+    missing = -inertia * acceleration - friction + carried
+    missing += noise * np.random.default_rng(3).standard_normal(angle.size)
+    return Seen(BARE, angle, velocity, acceleration, missing)
+
+
+SIZES = st.floats(0.1, 10.0)
+
+
+@settings(max_examples=40, deadline=None)
+@given(SIZES, SIZES, SIZES, st.floats(-3.0, 3.0), st.floats(-1.5, 4.0))
+def test_friction_gravity_and_inertia_are_seen_as_they_are(
+    coulomb, viscous, gravity, direction, inertia
+):
+    joint = seen(inertia, coulomb, viscous, load=lambda q: -gravity * np.sin(q + direction))
+    names, model = joint.together(EVERY)[0]
+    assert set(names) == {"coulomb_friction", "viscous_friction", "gravity"}
+    assert names[-1] == "gravity"
+    found = {name: model.effects[name] for name in model.effects if name.split(".")[0] in names}
+    assert found["coulomb_friction.motor_nm"] == pytest.approx(coulomb, rel=1e-4)
+    assert found["viscous_friction.motor_nm_s_rad"] == pytest.approx(viscous, rel=1e-4)
+    assert found["gravity.torque_nm"] == pytest.approx(gravity, rel=1e-4)
+    assert math.cos(found["gravity.angle_rad"] - direction) == pytest.approx(1.0, abs=1e-6)
+    assert model.plant["jm"] == pytest.approx(2.0 + inertia, rel=1e-4)
+
+
+def test_friction_under_load_is_told_from_that_of_the_motor():
+    joint = seen(0.3, 1.0, 0.5, of_load=0.2, load=lambda q: -8.0 * np.sin(q))
+    names, model = joint.together(EVERY)[0]
+    assert names == ("coulomb_friction", "viscous_friction", "load_friction", "gravity")
+    assert model.effects["load_friction.coefficient"] == pytest.approx(0.2, rel=0.2)
+    without = tuple(name for name in EVERY if name != "load_friction")
+    assert "load_friction" not in joint.together(without)[0][0]
+
+
+def test_the_plainest_load_that_does_as_well_is_taken_and_none_where_there_is_none():
+    held = seen(0.1, 1.0, 0.5, load=lambda q: 0.4 + 0.0 * q, noise=0.05)
+    assert [names[-1] for names, _ in held.together(EVERY)] == ["torque_bias"]
+    free = seen(0.1, 1.0, 0.5, noise=0.05)
+    assert [names for names, _ in free.together(EVERY)] == [
+        ("coulomb_friction", "viscous_friction")
+    ]
+    sprung = seen(0.1, 1.0, 0.5, load=lambda q: -3.0 * (q - 0.2), noise=0.05)
+    names, model = sprung.together(EVERY)[0]
+    assert names[-1] == "external_spring"
+    assert model.effects["external_spring.stiffness_nm_rad"] == pytest.approx(3.0, rel=0.02)
+    assert model.effects["external_spring.rest_rad"] == pytest.approx(0.2, rel=0.1)
+
+
+def test_one_cause_alone_and_what_pushes_are_left_to_the_usual_search():
+    assert seen(0.1, viscous=0.5, noise=0.01).together(EVERY) == []
+    assert seen(0.1, -1.0, 0.5, noise=0.01).together(("coulomb_friction", "viscous_friction")) == []
+    assert seen(-2.5, 1.0, 0.5, noise=0.01).together(EVERY) == []  # no inertia would be left
+    assert load_parameters("external_spring", [-1.0, 0.0]) is None
+
+
+def test_columns_of_any_size_are_solved():
+    columns = [np.array([1e-9, 2e-9, 1e-9]), np.array([1e9, 0.0, -1e9]), np.zeros(3)]
+    sizes, left = solved(columns, 3e9 * columns[0] + 2e-9 * columns[1])
+    assert sizes[:2] == pytest.approx([3e9, 2e-9]) and left == pytest.approx(0.0, abs=1e-9)
+
+
+def moved(motion: np.ndarray, inertia, coulomb, viscous, gravity) -> np.ndarray:
+    """Return the torque of a motion (angle, speed, acceleration) by inverse dynamics."""
+    angle, speed, acceleration = motion
+    friction = coulomb * np.tanh(speed / 2e-3) + viscous * speed
+    return inertia * acceleration + friction + gravity * np.sin(angle)
+
+
+def test_a_robot_joint_whose_datasheet_is_an_inertia_alone_is_found_whole(tmp_path):
+    """Two Fourier trajectories that repeat, of which each cause alone leaves most unexplained."""
+    truth = {
+        "coulomb_friction.motor_nm": 0.9,
+        "viscous_friction.motor_nm_s_rad": 1.6,
+        "gravity.torque_nm": 4.0,
+    }
+    rate, rng, files = 125.0, np.random.default_rng(4), []
+    stamps = np.arange(int(20.0 * rate)) / rate
+    for number in range(2):
+        motion = np.zeros((3, stamps.size))
+        for line in range(1, 6):
+            w, turn = 0.2 * np.pi * line, rng.normal() * 0.6 / line
+            turn = turn * np.exp(1j * (0.2 * np.pi * line * stamps + rng.uniform(0, 6.3)))
+            motion += np.array([turn.imag, (1j * w * turn).imag, (-w * w * turn).imag])
+        torque = moved(motion, 1.4, *truth.values())
+        torque += 0.02 * np.std(torque) * rng.standard_normal(torque.size)
+        seen_angle = motion[0] + 2e-5 * rng.standard_normal(stamps.size)
+        files.append(Path(tmp_path) / f"run{number}.csv")
+        table = np.column_stack([stamps, motion[0], seen_angle, torque])
+        head = {"delimiter": ",", "header": "t,r,q,tau", "comments": ""}
+        np.savetxt(files[-1], table, fmt="%.9g", **head)
+    columns = parse_map(["time=t", "reference=r:1", "position=q:1", "torque=tau:1"])
+    import_files(files, tmp_path / "bags", ImportOptions(columns))
+    found = diagnose(tmp_path / "bags", datasheet({"jm": 1.1}, "joint"))
+    assert {name.split(".")[0] for name in truth} <= set(found.effects)
+    for name, size in truth.items():
+        assert found.parameters[name].value == pytest.approx(size, rel=0.08)
+    assert found.parameters["jm"].value == pytest.approx(1.4, rel=0.08)
