@@ -59,11 +59,12 @@ class Joint:
         inertial = inertia * hardest
         friction, ratio = inertial * 10.0 ** rng.uniform(-0.2, 0.7), 2.0 ** rng.uniform(-1, 1)
         bandwidth = 2.0 * np.pi * rng.uniform(1.5, 4)
+        gravity = inertial * rng.uniform(1, 6) * (rng.random() < 0.7)
         return cls(
             rate, seconds, inertia, friction * ratio / (1 + ratio), friction / (1 + ratio) / speed,
-            inertial * rng.uniform(1, 6) * (rng.random() < 0.7),
+            gravity,
             rng.uniform(-1, 1) * (rng.random() < 0.5),
-            rng.uniform(0.05, 0.15) * (rng.random() < 0.5),
+            rng.uniform(0.05, 0.15) * (gravity > 0.0) * (rng.random() < 0.5),
             bandwidth, inertia * bandwidth**3 / 6.0 * (rng.random() < 0.5), motions,
         )  # fmt: skip
 

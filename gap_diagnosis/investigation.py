@@ -27,7 +27,7 @@ from .model.steady_runs import SteadyRuns
 from .outcome.diagnosis import Bags, Diagnosis
 from .outcome.verdict_words import OUT_OF_TIME, ROUNDING
 from .verdict.coarse_encoder import with_coarse_encoder
-from .verdict.judgement import judge
+from .verdict.judgement import PLAIN, judge
 from .verdict.kept_causes import kept
 from .verdict.notes import at_limits, yielding
 from .verdict.tested_causes import Tested
@@ -40,6 +40,7 @@ from .which.found import Found
 from .which.gains import stands_for
 from .which.rounding import beside_rounding
 from .which.search_space import TOLERANCE
+from .which.seen_together import LACKED
 from .which.stepwise import Stepwise
 from .which.torque_timing import Timing, timed
 from .which.unseen_friction import SCATTER
@@ -58,7 +59,8 @@ LOST = (
 )
 
 _HOPELESS = 5.0
-"""Times the motion: where the refit misses more, nothing is searched, for no effect mends that."""
+"""Times the motion: where the refit misses more, nothing is searched, for no effect mends that but
+the friction that a datasheet lacks, without which a torque drives an axis away."""
 _SHOWN = 3
 """Most runs of which the same is said."""
 _SEARCH_SHARE = 0.6
@@ -181,7 +183,7 @@ def investigate_runs(
         progress("torque of the slow motion")
         fitter = CellFitter(Evidence(records, nominal, slow), model.plant, tolerance)
         timing = Timing(fitter, fitter.refit(), (QUASI_STATIC,))
-    if _misses(timing.fitter, timing.refit) > _HOPELESS:
+    if _misses(timing.fitter, timing.refit) > _HOPELESS and not set(LACKED) & set(names):
         names = []
     found = _searched(timing, names, progress, until)
     if (other := timing.other_if_better(found.best)) is not None:
@@ -196,7 +198,8 @@ def investigate_runs(
     bags, scatter, said = _run_scatter(fitter, found.best)
     heard += said
     found, tested = kept(fitter, found, scatter, progress, names, until)
-    if (tested or not names) and _misses(fitter, found.best) >= 1.0:
+    lost = _misses(fitter, found.best) >= 1.0 and not fitter.misfit(found.best) < PLAIN
+    if (tested or not names) and lost:
         found, tested = replace(found, steps=found.steps[:1]), []
         heard.append(LOST)
     heard += yielding([t.effect for t in tested], fitter.misfit(found.best))

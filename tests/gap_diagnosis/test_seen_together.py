@@ -10,9 +10,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from controller_node.transfer_function import TransferFunction
+from fjr_interface.experiment import RecordDescription
 from fjr_records.importers.import_map import parse_map
 from fjr_records.importers.importer import ImportOptions, import_files
-from gap_diagnosis.any_record import diagnose
+from fjr_records.records import Record, RecordSet
+from fjr_sim_node.plant import coefficients
+from fjr_sim_node.simulation.closed_loop import simulate_law
+from gap_diagnosis.any_record import diagnose, investigate
 from gap_diagnosis.model.nominal import datasheet
 from gap_diagnosis.model.rig_model import Model
 from gap_diagnosis.which.seen_together import LOADS, Seen, load_parameters, solved
@@ -127,3 +132,34 @@ def test_a_robot_joint_whose_datasheet_is_an_inertia_alone_is_found_whole(tmp_pa
     for name, size in truth.items():
         assert found.parameters[name].value == pytest.approx(size, rel=0.08)
     assert found.parameters["jm"].value == pytest.approx(1.4, rel=0.08)
+
+
+def driven(torque: np.ndarray, number: int, rate_hz: float, motor: dict[str, float]) -> Record:
+    """Return the record of a motor that a torque drives, with no loop about it."""
+    nothing = TransferFunction.of([0.0], [1.0])
+    rest = np.zeros(torque.size)
+    run = simulate_law(rest, rate_hz, coefficients(motor), nothing, command=torque)
+    described = RecordDescription.of(
+        "motor", sample_rate_hz=rate_hz, level=0, levels=1, realization=number, realizations=2
+    )
+    position = np.round(run.position / 1e-3) * 1e-3
+    return Record(f"run_{number}", described, None, torque, position, None)
+
+
+def test_a_motor_that_would_run_away_without_the_friction_that_its_datasheet_lacks_is_searched():
+    """Of such a motor the inertia alone misses many times the motion, which ends no search."""
+    rng, rate_hz, made = np.random.default_rng(5), 200.0, []
+    motor = {"jm": 7e-4, "j": 0.0, "fs": 0.0, "fsm": 0.045, "fv": 0.0, "fvm": 7e-4,
+             "k0": math.inf, "k1": 0.0}  # fmt: skip
+    for number in range(2):
+        steps = np.repeat(rng.uniform(-0.05, 0.05, 50), int(0.2 * rate_hz))
+        made.append(driven(steps, number, rate_hz, motor))
+    records = RecordSet("motor", rate_hz, tuple(made))
+    names = ("coulomb_friction", "viscous_friction", "torque_bias", "delay")
+    bare = datasheet({"jm": 7.5e-4}, "motor")
+    found = investigate(records, bare, effects=names)
+    assert found.diagnosis.steps[1].nrmse_position > 5.0
+    assert found.diagnosis.effects == ["coulomb_friction"]
+    assert found.diagnosis.steps[-1].nrmse_position < 0.02
+    size = found.diagnosis.parameters["coulomb_friction.motor_nm"]
+    assert size.value == pytest.approx(motor["fsm"], rel=0.05)
