@@ -245,7 +245,7 @@ def test_a_cause_without_which_nothing_of_the_gap_comes_back_is_not_present():
     fitter, refit, fit = biased()
     (tested,) = causes_with_tests(fitter, fit, refit, SCATTER)
     little = Figure(value=0.01, low=0.005, high=0.015)
-    closes_little = replace(tested, in_band=0.01, share=little)
+    closes_little = replace(tested, in_band=0.01, over_noise_closed=0.01, share=little)
     assert replace(tested, in_band=0.01).passed  # it closes the gap as a whole
     assert tested.passed and closes_little.present < 0.1 and not closes_little.passed
     assert 0.5 < tested.share.low < tested.share.high < 1.05
