@@ -256,7 +256,8 @@ def test_a_cause_without_which_nothing_of_the_gap_comes_back_is_not_present():
     closes_nothing = Figure(value=-0.02, low=-0.03, high=-0.01)
     assert not replace(tested, share=closes_nothing).passed
     unsure = replace(tested, share=Figure(value=0.6, low=-0.7, high=0.8))  # one part decides
-    assert unsure.passed and not replace(unsure, in_band=0.7).passed
+    little = {"in_band": 0.7, "over_noise_closed": 0.7}
+    assert unsure.passed and not replace(unsure, **little).passed
 
 
 def test_a_true_cause_is_the_same_at_all_levels_and_a_substitute_is_not():
