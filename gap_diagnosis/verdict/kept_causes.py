@@ -76,7 +76,8 @@ def kept(
 
     while steps[-1].effects:
         tested = tested or tests_of(steps[-1])
-        failed = [t for t in tested if not t.passed] or _twice(fitter, steps[-1], tested)
+        failed = [t for t in tested if not t.passed and t.effect not in bearing]
+        failed = failed or _twice(fitter, steps[-1], tested)
         guessed = [] if failed else [t for t in _guesses(tested) if t.effect not in bearing]
         failed = failed or guessed
         if not failed:
@@ -88,13 +89,14 @@ def kept(
         if in_time and weakest.effect not in replaced and len(steps[-1].effects) > 1:
             replaced.add(weakest.effect)
             other = _in_its_place(fitter, found, steps[-1], weakest, names)
-            if other is not None:
+            tests = [] if other is None else tests_of(other)
+            if other is not None and tests[-1].passes_beside_size:
                 replaced.add(other.effects[-1])
-                steps, tested = [*before, other], []
+                steps, tested = [*before, other], tests
                 continue
         fewer = _taken_out(fitter, before, weakest)
         tests = tests_of(fewer[-1])
-        if guessed and _bears(tested, tests):
+        if (guessed or weakest.nearly_passes) and _bears(tested, tests):
             bearing.add(weakest.effect)
             continue
         notes += [*_changing(weakest), *_kin(weakest), *_bent(weakest)]

@@ -12,7 +12,7 @@ from ..how_far.ledger import Ledger
 from ..outcome.diagnosis import Figure
 from ..which.cell_fits import CellFitter
 from ..which.comparison import CellFit
-from ..which.gains import Gain, beside_others, closed, fall, gain
+from ..which.gains import LEAST_GAIN, MOST_P, Gain, beside_others, closed, fall, gain
 from ..which.presence import (
     LEAST_INVARIANCE_P,
     SAME_WORTH,
@@ -102,6 +102,12 @@ class Tested:
         least = LEAST_PRESENT if self.certain else _UNCERTAIN * LEAST_PRESENT
         there = self.gain.present and closes and self.bounded is None
         return there and self.invariant and self.present >= least
+
+    @property
+    def nearly_passes(self) -> bool:
+        """Whether nothing is against it but that it is not sure enough, or repeats less often."""
+        gains = self.gain.mean > LEAST_GAIN and self.gain.p <= MOST_P
+        return self.certain and gains and self._closes and self.bounded is None and self.invariant
 
     @property
     def nearest_kin(self) -> bool:
