@@ -17,10 +17,10 @@ from controller_node.transfer_function import TransferFunction
 from fjr_kit.errors import InputError
 from fjr_records.record_noise import RecordNoise
 from fjr_records.records import RecordSet
-from fjr_sim_node.simulation import rig
 from fjr_sim_node.simulation.closed_loop import State
 
 from .drive import Drive
+from .near_steady import begins
 from .prediction import CROSSOVER_SHARE, model_observer, prediction_error, settles
 from .record_loop import RecordLoop, loop_of, without_erratic, without_swinging
 from .record_start import held_at, start_of
@@ -29,14 +29,7 @@ from .simulated_rig import run_parallel
 from .steady_runs import SteadyRuns
 
 _SMALL = 1e-4  # relative: a change of an inertia that must not grow
-_SETTLED = (1e-6, 1e-4)
-"""Least and greatest part of the rms position that is left of a transient; between them the noise
-of a line, for a tail that lies in one line must not count there."""
-_BENT = {"jm": 1.1, "j": 1.1, "fs": 1.2, "fsm": 1.2, "fv": 1.2, "fvm": 1.2, "k0": 0.9}
-"""Factors on the parameters of a model that must forget the state of the one it begins near."""
 _NOTHING = TransferFunction.of([0.0], [1.0])
-_FORGOTTEN = 3.0  # times what may be left of a transient
-_SLOWER = 1.5  # times as long as it took the model that is simulated first
 
 
 class RecordSimulator:
@@ -87,7 +80,7 @@ class RecordSimulator:
         self._begins: dict[int, tuple[int, State]] = {}
         self.loop = without_erratic(self.loop, names, self._growth(Model.nominal(nominal)))
         if isinstance(records, SteadyRuns):
-            self._begins = self._near_steady(Model.nominal(nominal), records.run_in, noise)
+            self._begins = begins(self, Model.nominal(nominal), records.run_in, noise)
 
     @property
     def driven(self) -> str:
@@ -159,68 +152,6 @@ class RecordSimulator:
             growth[index] = change / moved / _SMALL if np.isfinite(change) else np.inf
         return growth
 
-    def _near_steady(
-        self, nominal: Model, run_in: int, noise: RecordNoise
-    ) -> dict[int, tuple[int, State]]:
-        """Return where runs may begin that lead to a steady period, and in which state.
-
-        A model that is near to the nominal is sooner in its steady state from that one's than from
-        rest, unless it remembers for longer.
-        """
-        std = noise.std_rad if noise.known else 0.0
-        indices = range(len(self.records.records))
-        begins = run_parallel(lambda index: self._begin_near(nominal, index, run_in, std), indices)
-        return {i: begin for i, begin in zip(indices, begins, strict=True) if begin is not None}
-
-    def _begin_near(
-        self, model: Model, index: int, run_in: int, noise_rad: float
-    ) -> tuple[int, State] | None:
-        """Return from which sample on a run has to be simulated, and the state before.
-
-        How long before the steady period says the model's own way from rest: when its first period
-        has come near the last one, nearer where there is less noise.
-        """
-        drive, samples = self.drive(index), self.records.records[index].samples
-        period = samples - run_in
-        if self.too_stiff(model, index):
-            return None
-        try:
-            first = drive.simulated(self._rate, *self._coefficients(model))
-            off = np.abs(first.position[:period] - first.position[run_in:])
-            rms = float(np.std(first.position[run_in:]))
-            limit = min(max(noise_rad / period**0.5, _SETTLED[0] * rms), _SETTLED[1] * rms)
-            settled = int(_SLOWER * np.flatnonzero(np.append(True, off > limit))[-1])
-            begin = run_in - settled
-            if begin <= 0:
-                return None
-            until = drive.part(slice(begin)).simulated(self._rate, *self._coefficients(model))
-        except InputError:
-            return None
-        now = drive.elapsed_s + begin / self._rate
-        middle = float(first.motor[run_in:].mean())
-        rig.complete(until.end.rig, float(until.torque[-1]), now, middle)
-        found = begin, until.end
-        return found if self._forgets(model, drive, run_in, found, limit) else None
-
-    def _forgets(
-        self, model: Model, drive: Drive, run_in: int, begun: tuple[int, State], limit: float
-    ) -> bool:
-        """Tell whether another model forgets in which state it began.
-
-        Where friction holds a small motion, the place about which it moves depends on the way
-        there for ever.
-        """
-        bent = {n: v * _BENT.get(n, 1.0) for n, v in model.plant.items()}
-        other = self._coefficients(Model(bent, {}))
-        first, state = begun
-        try:
-            cold = drive.simulated(self._rate, *other).position[run_in:]
-            near = drive.part(slice(first, None), state).simulated(self._rate, *other)
-        except InputError:
-            return False
-        off = near.position[run_in - first :] - cold
-        return float(np.sqrt(np.mean(off**2))) <= _FORGOTTEN * limit
-
     def response(self, frequency_hz: np.ndarray, index: int) -> np.ndarray:
         """Return C_y of what holds a run: its controller, or the observer; complex, N m/rad."""
         law = self.loop.laws[index] or self._holding
@@ -269,7 +200,7 @@ class RecordSimulator:
         model, index = job
         record = self.records.records[index]
         try:
-            run = self._observed(index).simulated(self._rate, *self._coefficients(model))
+            run = self._observed(index).simulated(self._rate, *self.coefficients(model))
             return run.torque - record.torque
         except InputError:
             return np.full(record.samples, np.nan)
@@ -307,7 +238,7 @@ class RecordSimulator:
         """
         try:
             drive = self.drive(index)
-            run = drive.simulated(self._rate, *self._coefficients(model), noise)
+            run = drive.simulated(self._rate, *self.coefficients(model), noise)
         except InputError:
             return np.full((3, self.records.records[index].samples), np.nan)
         return np.array([run.position, run.torque, run.motor if model.rigid else run.link])
@@ -321,7 +252,7 @@ class RecordSimulator:
         if state is not None:
             drive = drive.part(slice(first, None), state)
         try:
-            run = drive.simulated(self._rate, *self._coefficients(model))
+            run = drive.simulated(self._rate, *self.coefficients(model))
         except InputError:
             return np.full((3, samples), np.nan)
         out = np.array([run.position, run.torque, run.motor if model.rigid else run.link])
@@ -334,7 +265,8 @@ class RecordSimulator:
             return out
         return out + self._added[index]
 
-    def _coefficients(self, model: Model) -> tuple[tuple[float, ...], np.ndarray | None]:
+    def coefficients(self, model: Model) -> tuple[tuple[float, ...], np.ndarray | None]:
+        """Return what a simulation of a model takes: its plant and its effects."""
         played = model.smooth if self._named else model
         return played.plant_coefficients, played.effect_coefficients
 

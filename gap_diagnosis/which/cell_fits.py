@@ -148,16 +148,13 @@ class CellFitter(ReweightedFits):
             parent: the explanation, of the base parameters alone.
             effects: identifiers of what may be there.
         """
-        fits = []
+        (friction, bristles), fits = STICKING, []
         for names, model in self._ripples(parent)[1].together(effects):
-            rigid = self._jointly(parent, names, [model])
-            friction, bristles = STICKING
+            sets = [names]
             if friction in names and bristles in effects:
-                yielding = tuple(
-                    dict.fromkeys(e for n in names for e in (n, bristles if n == friction else n))
-                )
-                fits.append(self._jointly(parent, yielding, [model]))
-            fits.append(rigid)
+                at = names.index(friction) + 1
+                sets.insert(0, (*names[:at], bristles, *names[at:]))
+            fits += [self._jointly(parent, each, [model]) for each in sets]
         return [fit for fit in fits if fit is not None]
 
     def _jointly(
