@@ -40,7 +40,6 @@ from .which.found import Found
 from .which.gains import stands_for
 from .which.rounding import beside_rounding
 from .which.search_space import TOLERANCE
-from .which.seen_together import LACKED
 from .which.stepwise import Stepwise
 from .which.torque_timing import Timing, timed
 from .which.unseen_friction import SCATTER
@@ -60,7 +59,7 @@ LOST = (
 
 _HOPELESS = 5.0
 """Times the motion: where the refit misses more, nothing is searched, for no effect mends that but
-the friction that a datasheet lacks, without which a torque drives an axis away."""
+friction where the datasheet has none at all, so that a torque drives the axis away."""
 _SHOWN = 3
 """Most runs of which the same is said."""
 _SEARCH_SHARE = 0.6
@@ -183,7 +182,8 @@ def investigate_runs(
         progress("torque of the slow motion")
         fitter = CellFitter(Evidence(records, nominal, slow), model.plant, tolerance)
         timing = Timing(fitter, fitter.refit(), (QUASI_STATIC,))
-    if _misses(timing.fitter, timing.refit) > _HOPELESS and not set(LACKED) & set(names):
+    resists = any(model.plant.get(name) for name in GROUPS["friction"])
+    if _misses(timing.fitter, timing.refit) > _HOPELESS and resists:
         names = []
     found = _searched(timing, names, progress, until)
     if (other := timing.other_if_better(found.best)) is not None:
