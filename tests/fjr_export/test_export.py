@@ -100,9 +100,11 @@ def test_a_diagnosis_stands_for_the_bags_around_it(campaign, tmp_path):
     (diagnosis / "diagnosis.json").write_text("{}", encoding="utf-8")
     assert record_folder(diagnosis) == record_folder(diagnosis / "diagnosis.json")
     assert record_folder(diagnosis).samefile(campaign)
-    (tmp_path / "diagnosis.json").write_text("{}", encoding="utf-8")
+    alone = tmp_path / "without_bags" / "diagnosis"  # beside tmp_path lie the bags of other tests
+    alone.mkdir(parents=True)
+    (alone / "diagnosis.json").write_text("{}", encoding="utf-8")
     said = fjr("export", campaign / "campaign.yaml", "--to", "mjcf", "--out", tmp_path / "o",
-               "--replay", tmp_path)  # fmt: skip
+               "--replay", alone)  # fmt: skip
     assert said.exit_code == 2 and "no bags stand around this diagnosis" in said.output
     (diagnosis / "diagnosis.json").unlink()
     diagnosis.rmdir()
