@@ -160,8 +160,7 @@ class Tested:
         be a part of what no effect explains, or of what the law of another cause leaves. Of 11
         causes of the blind checks 307 to 311 that closed less than a quarter of what was left, 6
         were right, stated at 0.79 in the mean. One part may hold most of the squares even in that
-        band, so what stands out of the noise counts as well, by half; but that may be what the form
-        of another law leaves.
+        band, so what stands out of the noise counts as well, by half.
         """
         sure = (1.0 - min(1.0, 5.0 * self.gain.p)) * min(1.0, self.gain.share + 0.1)
         of_all = self.share.low if self.share.low is not None and self.share.low > 0.0 else 0.0
@@ -170,8 +169,8 @@ class Tested:
         sure *= closed / (closed + _DOUBTED * (1.0 - closed))
         share = max(0.0, self.share.value)
         beside_left = share / max(share + self.left, 1e-300)
-        of_left = float(np.fmax(beside_left, self.over_noise_closed))
-        sure *= _IF_NOTHING + (1.0 - _IF_NOTHING) * min(of_left / _LITTLE, 1.0)
+        beside_left = float(np.fmax(beside_left, self.over_noise_closed))
+        sure *= _IF_NOTHING + (1.0 - _IF_NOTHING) * min(beside_left / _LITTLE, 1.0)
         sure *= self._beside_much
         beyond_form = max(
             np.interp(share, _SMALL, (0.0, 1.0)),
