@@ -63,7 +63,10 @@ def describe(
     periodic = all(isinstance(record.repetition, Repetition) for record in records)
     differing = _differing(records, each_level) if periodic else None
     if differing is not None and must_repeat:
-        raise InputError(f"{differing}; import them into separate folders.")
+        raise InputError(
+            f"{differing}; import them into separate folders, or leave out what is said of their "
+            "periods and lines: then they are records that do not repeat."
+        )
     if differing is not None:
         notes.append(
             f"{differing}, so all are taken as records that do not repeat; imported into separate "
