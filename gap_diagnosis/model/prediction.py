@@ -18,6 +18,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.fft import next_fast_len
 from scipy.signal import cont2discrete
 
 from controller_node.transfer_function import TransferFunction
@@ -174,6 +175,32 @@ def prediction_error(
     loop = plant * observer.response(frequency, sample_rate_hz)[1]
     error = (np.fft.rfft(position) - plant * np.fft.rfft(torque)) / (1.0 + loop)
     return np.fft.irfft(error, samples)
+
+
+def added_for(
+    torque: np.ndarray,
+    nominal: Mapping[str, float],
+    observer: TransferFunction,
+    sample_rate_hz: float,
+) -> np.ndarray:
+    """Return what an observer of a linear model adds for a torque that the model lacks.
+
+    Args:
+        torque: (samples,) from when model and observer begin, N m.
+        nominal: values of the model by the names of PLANT.
+        observer: that holds the model.
+        sample_rate_hz: rate of the samples.
+
+    Returns:
+        G L (1 + G L)^-1 torque, (samples,) in N m: the torque itself up to the crossover, late and
+        less above.
+    """
+    samples = next_fast_len(2 * torque.size, real=True)
+    frequency = np.fft.rfftfreq(samples, 1.0 / sample_rate_hz)
+    frequency[0] = _NEARLY_ZERO * frequency[1]  # a free axis has no gain at zero
+    plant = linear.g0(nominal, frequency, sample_rate_hz)
+    loop = plant * observer.response(frequency, sample_rate_hz)[1]
+    return np.fft.irfft(np.fft.rfft(torque, samples) * loop / (1.0 + loop), samples)[: torque.size]
 
 
 def loses(recorded: RecordedExperiment) -> str:

@@ -175,6 +175,10 @@ class QuasiStaticSimulator:
         """Return the torque that a model needs beyond the recorded one, N m."""
         return [self._needed(model, i) - self._records[i].torque for i in which]
 
+    def added_for(self, torque: np.ndarray, _: Model) -> np.ndarray:
+        """Return a torque that a model lacks, which is seen as it is."""
+        return torque
+
     def _run(self, model: Model, index: int) -> np.ndarray:
         record, needed = self._records[index], self._needed(model, index)
         held = record.position - (needed - record.torque) / self._stiffness

@@ -21,7 +21,7 @@ from fjr_sim_node.simulation.closed_loop import State
 
 from .drive import Drive
 from .near_steady import begins
-from .prediction import CROSSOVER_SHARE, model_observer, prediction_error, settles
+from .prediction import CROSSOVER_SHARE, added_for, model_observer, prediction_error, settles
 from .record_loop import RecordLoop, loop_of, without_erratic, without_swinging
 from .record_start import held_at, start_of
 from .rig_model import Model, too_stiff
@@ -204,6 +204,10 @@ class RecordSimulator:
             return run.torque - record.torque
         except InputError:
             return np.full(record.samples, np.nan)
+
+    def added_for(self, torque: np.ndarray, model: Model) -> np.ndarray:
+        """Return what that observer adds for a torque that a model lacks, (samples,), N m."""
+        return added_for(torque, model.whole_plant, self._observer, self._rate)
 
     def drive(self, index: int) -> Drive:
         """Return what drives a simulation of one run."""

@@ -76,9 +76,10 @@ def kept(
 
     while steps[-1].effects:
         tested = tested or tests_of(steps[-1])
-        failed = [t for t in tested if not t.passed and t.effect not in bearing]
+        stay = {*bearing, *_bases(fitter, tested, names)}
+        failed = [t for t in tested if not t.passed and t.effect not in stay]
         failed = failed or _twice(fitter, steps[-1], tested)
-        guessed = [] if failed else [t for t in _guesses(tested) if t.effect not in bearing]
+        guessed = [] if failed else [t for t in _guesses(tested) if t.effect not in stay]
         failed = failed or guessed
         if not failed:
             break
@@ -104,6 +105,22 @@ def kept(
     if tested and any(len(fit.effects) != count for count, fit in enumerate(steps)):
         steps = [steps[0], *_one_by_one(fitter, steps[-1], tested)]
     return replace(found, steps=steps, notes=tuple(notes)), tested
+
+
+def _bases(fitter: CellFitter, tested: Sequence[Tested], names: Sequence[str]) -> set[str]:
+    """Return the causes that others modify which pass, where the datasheet lacks them.
+
+    Left alone, what modifies one would bend to stand in for it (see `founded`): friction that falls
+    from breakaway becomes the whole friction, with a velocity that is not its own.
+    """
+    passed = [t.effect for t in tested if t.passed]
+    return {
+        t.effect
+        for t in tested
+        if t.certain and t.invariant
+        for e in passed
+        if fx.EFFECTS[e].modifies == t.effect and not founded([e], (), fitter.nominal, names)
+    }
 
 
 def _in_its_place(

@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
 from ..model.rig_model import Model
 
@@ -21,7 +22,7 @@ LAWS: Mapping[str, Callable[[np.ndarray], np.ndarray]] = {
     "quadratic_friction.motor_nm_s2_rad2": lambda v: -v * np.abs(v),
 }
 """Laws of friction whose torque at a velocity is proportional to their size."""
-LACKED = ("coulomb_friction", "viscous_friction")
+LACKED = ("coulomb_friction", "viscous_friction", "quadratic_friction")
 """Frictions that a datasheet of inertias lacks."""
 _OF_LOAD = "load_friction.coefficient"
 _SLIGHT = 1e-6  # of the squares of the torque: less of it says nothing
@@ -32,12 +33,13 @@ load that leaves no more does as well."""
 
 @dataclass(frozen=True)
 class Seen:
-    """The torque that a model lacks at each angle of a recorded motion, where friction slides.
+    """The torque that a model lacks along a recorded motion, where friction slides.
 
     Attributes:
         model: the model.
         angle, velocity, acceleration: (samples,), of the motor.
-        missing: (samples,), N m.
+        missing: (places,), as it is seen there, N m.
+        seen: makes of a torque, (samples,), what is seen of it, (places,).
     """
 
     model: Model
@@ -45,6 +47,7 @@ class Seen:
     velocity: np.ndarray
     acceleration: np.ndarray
     missing: np.ndarray
+    seen: Callable[[np.ndarray], np.ndarray] = lambda torque: torque
 
     def together(self, effects: Sequence[str]) -> list[tuple[tuple[str, ...], Model]]:
         """Return what only together explains the torque, each set with a model that has it.
@@ -72,34 +75,48 @@ class Seen:
         return found
 
     def _needed(self, laws: Sequence[str], load: str, effects: Sequence[str]) -> list[str]:
-        """Return the laws, and that of friction under load, without which more is left."""
-        every = [*laws, _OF_LOAD] if load and _effect(_OF_LOAD) in effects else list(laws)
-        least = _NO_WORSE * self._regressed(every, load)[1]
-        return [n for n in every if self._regressed([o for o in every if o != n], load)[1] > least]
+        """Return the laws, and that of friction under load, without which more is left.
+
+        What is needed least goes first, of two that do the same the law under load: beside a
+        constant load it is Coulomb friction.
+        """
+        needed = list(laws)
+        if load and _effect(_OF_LOAD) in effects:
+            needed.append(_OF_LOAD)
+        least = _NO_WORSE * self._regressed(needed, load)[1]
+        while needed:
+            fewer = [[o for o in needed if o != name] for name in reversed(needed)]
+            left, rest = min(
+                ((self._regressed(names, load)[1], names) for names in fewer), key=lambda f: f[0]
+            )
+            if left > least:
+                break
+            needed = rest
+        return needed
 
     def _regressed(self, laws: Sequence[str], load: str) -> tuple[Model | None, float]:
         """Return the model with laws and a load, inertia solved, too, and the squares left.
 
-        Friction under load is that of the load which the laws without it leave. No model where a
-        friction or a spring has the wrong sign.
+        No friction is below zero. Friction under load is that of the load which the laws without it
+        leave. No model where a spring pushes.
         """
-        columns = [-self.acceleration, *(LAWS[n](self.velocity) for n in laws if n != _OF_LOAD)]
-        of_load = load_torques(load, self.angle)
         order = [n for n in laws if n != _OF_LOAD]
-        sizes, left = solved([*columns, *of_load], self.missing)
+        torques = [*(LAWS[n](self.velocity) for n in order), -self.acceleration]
+        carried = load_torques(load, self.angle)
+        columns = [self.seen(torque) for torque in (*torques, *carried)]
+        sizes, left = solved(columns, self.missing, len(order))
         if _OF_LOAD in laws:
-            carried = np.array(of_load).T @ sizes[len(columns) :]
-            columns.append(-np.sign(self.velocity) * np.abs(carried))
+            weight = np.abs(np.array(carried).T @ sizes[len(torques) :])
+            columns.insert(len(order), self.seen(-np.sign(self.velocity) * weight))
             order.append(_OF_LOAD)
-            sizes, left = solved([*columns, *of_load], self.missing)
+            sizes, left = solved(columns, self.missing, len(order))
         left = max(left, _SLIGHT * float(np.sum(self.missing**2)))
-        inertia, *frictions = sizes[: len(columns)]
-        seed = load_parameters(load, sizes[len(columns) :])
-        if seed is None or min(frictions, default=1.0) <= 0.0:
+        frictions, (inertia, *loads) = sizes[: len(order)], sizes[len(order) :]
+        seed = load_parameters(load, loads)
+        if seed is None:
             return None, left
-        return heavier(
-            self.model, inertia, {**dict(zip(order, frictions, strict=True)), **seed}
-        ), left
+        found = {name: size for name, size in zip(order, frictions, strict=True) if size}
+        return heavier(self.model, inertia, {**found, **seed}), left
 
 
 def load_torques(load: str, angle: np.ndarray) -> list[np.ndarray]:
@@ -128,11 +145,24 @@ def load_parameters(load: str, sizes: Sequence[float]) -> dict[str, float] | Non
     return {"external_spring.stiffness_nm_rad": size, "external_spring.rest_rad": other / size}
 
 
-def solved(columns: Sequence[np.ndarray], torque: np.ndarray) -> tuple[list[float], float]:
-    """Return by least squares how much of each column is in a torque, and the squares left."""
+def solved(
+    columns: Sequence[np.ndarray], torque: np.ndarray, positive: int = 0
+) -> tuple[list[float], float]:
+    """Return by least squares how much of each column is in a torque, and the squares left.
+
+    Args:
+        columns: (rows,) each.
+        torque: (rows,).
+        positive: so many of the first are not below zero.
+    """
     scales = [float(np.sqrt(np.mean(column**2))) or 1.0 for column in columns]
     scaled = np.array(columns).T / scales
-    sizes = np.linalg.lstsq(scaled, torque, rcond=1e-9)[0]
+    corner = np.linalg.qr(np.column_stack([scaled, torque]), mode="r")
+    if positive:
+        least = np.where(np.arange(len(scales)) < positive, 0.0, -np.inf)
+        sizes = lsq_linear(corner[:, :-1], corner[:, -1], (least, np.inf), method="bvls").x
+    else:
+        sizes = np.linalg.lstsq(corner[:, :-1], corner[:, -1], rcond=1e-9)[0]
     return (sizes / scales).tolist(), float(np.sum((torque - scaled @ sizes) ** 2))
 
 

@@ -14,6 +14,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
+from scipy.signal import savgol_filter
 
 from fjr_sim_node import effects as fx
 
@@ -49,7 +51,9 @@ class SeenTorques:
         self._crossover_hz = simulator.crossover_hz
         every = max(int(rate / (_PER_CROSSOVER * simulator.crossover_hz)), 1)
         runs = sorted({evidence.parts[p].record for p in parts})
-        columns: list[np.ndarray] = []
+        self._simulator, self._every = simulator, every
+        self._ends = np.cumsum([records[index].samples for index in runs])[:-1]
+        self._places, columns, motions = [], [], []
         for index, missing in zip(runs, simulator.missing_torque(model, runs), strict=True):
             record = records[index]
             seen = np.zeros(record.samples, bool)
@@ -57,14 +61,32 @@ class SeenTorques:
                 begin = evidence.hop * part.windows.start + evidence.hop // 2
                 seen[begin : begin + evidence.hop * (part.windows.stop - part.windows.start)] = True
             velocity = np.gradient(_averaged(record.position, every)) * rate / every
+            missing = uniform_filter1d(missing, every)  # as the motion is averaged
             signals = [_averaged(s, every) for s in (record.position, record.torque, missing)]
             rows = _averaged(seen.astype(float), every) > 0.5
             acceleration = np.gradient(velocity) * rate / every
             columns.append(np.array([*signals, velocity, acceleration])[:, rows])
+            self._places.append(rows)
+            motions.append(_motion(record.position, every, rate))
         found: np.ndarray = np.concatenate(columns, axis=1)
         self._angle, self._torque, self._missing = found[0], found[1], found[2]
         self._velocity, self._acceleration = found[3], found[4]
+        self._motion: np.ndarray = np.concatenate(motions, axis=1)
         self._usual_speed = float(np.sqrt(np.mean(self._velocity**2) + 1e-300))
+
+    def _seen(self, torque: np.ndarray) -> np.ndarray:
+        """Return what is seen of a torque that the model lacks along the motion, (places,).
+
+        Args:
+            torque: (samples,) of all runs, N m.
+        """
+        pieces = zip(np.split(torque, self._ends), self._places, strict=True)
+        return np.concatenate(
+            [
+                _averaged(self._simulator.added_for(piece, self._model), self._every)[rows]
+                for piece, rows in pieces
+            ]
+        )
 
     def load(self, effect: str) -> list[dict[str, float]]:
         """Return the starting point of a torque that depends on the angle alone, or on nothing.
@@ -74,9 +96,10 @@ class SeenTorques:
         """
         if self._angle.size < 4 * _PER_CROSSOVER or not np.isfinite(self._missing).all():
             return []
-        motion = [self._velocity, np.sign(self._velocity), self._acceleration]
-        columns = load_torques(effect, self._angle)
-        sizes, _ = solved([*columns, *motion], self._missing)
+        angle, velocity, acceleration = self._motion
+        columns = load_torques(effect, angle)
+        every = [*columns, velocity, np.sign(velocity), acceleration]
+        sizes, _ = solved([self._seen(column) for column in every], self._missing)
         seed = load_parameters(effect, sizes[: len(columns)])
         return [] if seed is None else [seed]
 
@@ -89,8 +112,10 @@ class SeenTorques:
         rows = np.abs(self._velocity) > _SLIDES * self._usual_speed
         if rows.sum() < 8 * _PER_CROSSOVER or not np.isfinite(self._missing).all():
             return []
-        signals = (self._angle, self._velocity, self._acceleration, self._missing)
-        return Seen(self._model, *(signal[rows] for signal in signals)).together(effects)
+        seen = Seen(
+            self._model, *self._motion, self._missing[rows], lambda torque: self._seen(torque)[rows]
+        )
+        return seen.together(effects)
 
     def friction(self, effect: str) -> list[Model]:
         """Return models with a law of friction more: alone, and with those of the fit solved anew.
@@ -114,13 +139,11 @@ class SeenTorques:
     def _solved(self, names: Sequence[str], rows: np.ndarray) -> Model | None:
         """Return the model with sizes of laws of friction solved; None if one is below zero."""
         plant, effects = self._model.plant, self._model.effects
-        velocity = self._velocity[rows]
+        angle, velocity, acceleration = self._motion
         follow = [n for n in LAWS if n not in names and plant.get(fx.parameter(n).adds_to)]
-        columns = [
-            -self._acceleration[rows],
-            *(LAWS[name](velocity) for name in (*names, *follow)),
-        ]
-        columns += [np.ones(velocity.size), self._angle[rows]]
+        torques = [-acceleration, *(LAWS[name](velocity) for name in (*names, *follow))]
+        torques += [np.ones(velocity.size), angle]
+        columns = [self._seen(torque)[rows] for torque in torques]
         (inertia, *added), _ = solved(columns, self._missing[rows])
         sizes = {n: effects.get(n, 0.0) + size for n, size in zip(names, added, strict=False)}
         return None if min(sizes.values()) <= 0.0 else heavier(self._model, inertia, sizes)
@@ -192,6 +215,12 @@ def _best(explained: np.ndarray) -> list[int]:
     near = np.flatnonzero(explained >= _NEARLY * explained.max())
     some = near[np.linspace(0, near.size - 1, min(near.size, _ALIKE)).astype(int)]
     return sorted({*highest.tolist(), *some.tolist()})
+
+
+def _motion(position: np.ndarray, every: int, rate: float) -> np.ndarray:
+    """Return angle, velocity and acceleration, averaged over as many samples, (3, samples)."""
+    angle = uniform_filter1d(position, every)
+    return np.array([savgol_filter(angle, 5, 4, deriv=n, delta=1.0 / rate) for n in range(3)])
 
 
 def _averaged(signal: np.ndarray, every: int) -> np.ndarray:
