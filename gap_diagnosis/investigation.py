@@ -51,6 +51,11 @@ ASSUMED = (
     f"for {100 * SCATTER:.0f} %. Two runs more than levels that all move enough show it."
 )
 
+SWINGS_FREE = (
+    "No run has a torque, so that all sizes show only as ratios to the inertia: that of the motor "
+    "is taken from the datasheet, and all other sizes are off as far as it is."
+)
+
 LOST = (
     "The best explanation still misses more than the whole motion, so it predicts nothing and none "
     "of its causes is named: check the datasheet, the factor of the torque, and whether the runs "
@@ -168,7 +173,10 @@ def investigate_runs(
     )  # fmt: skip
     model = Model.nominal(nominal)
     linear_axis = any(record.description.linear for record in records.records)
-    names = catalogue(model.plant, order.effects, linear_axis=linear_axis)
+    swings_free = not any(np.any(record.torque) for record in records.records)
+    names = catalogue(
+        model.plant, order.effects, linear_axis=linear_axis, swings_free=swings_free
+    )
     if order.drift and order.effects is None:
         names.append(DRIFT)
     if slow is None:
@@ -278,6 +286,8 @@ def _notes(evidence: Evidence, found: Found) -> list[str]:
     if not loop.commanded:  # a controller that makes the torque has its sign
         doubted = [(r.name, wrong_sign(r.torque, r.position)) for r in evidence.records.records]
         notes += [f"{name}: {doubt}." for name, doubt in doubted if doubt is not None][:_SHOWN]
+    if evidence.swings_free:
+        notes.append(SWINGS_FREE)
     step = evidence.noise.step_rad
     if step is not None and evidence.noise.std_rad <= 1.01 * step / math.sqrt(12.0):
         notes.append(

@@ -158,6 +158,11 @@ class Evidence:
         return np.add.reduceat(squares, self.edges[:-1]) / np.diff(self.edges)
 
     @property
+    def swings_free(self) -> bool:
+        """Whether no run has a torque: then sizes show only as ratios to the inertia."""
+        return not any(np.any(record.torque) for record in self.records.records)
+
+    @property
     def player(self) -> RecordSimulator:
         """What plays the runs; that of slow ones plays nothing."""
         assert isinstance(self.simulator, RecordSimulator)

@@ -65,23 +65,28 @@ def stations(records: RecordSet, nominal: Mapping[str, float]) -> Stations | Non
     rate, runs = records.sample_rate_hz, records.records
     noise = record_noise(records)
     noise_rad = noise.std_rad if noise.known else 0.0
-    if any(_inertia_share(r, rate, inertia, noise_rad) > _INERTIA_SHARE for r in runs):
+    shares = [_inertia_share(r, rate, inertia, noise_rad) for r in runs]
+    if any(np.quantile(share, 1.0 - _QUICK) > _INERTIA_SHARE for share in shares):
         return None
+    slow = [share <= _INERTIA_SHARE for share in shares]
     travels = [_travel(r.position) for r in runs]
     length = sum(float(np.abs(moves).sum()) for moves, _ in travels) / _STATIONS
     if not length > 0.0:
         return None
-    found = [_averaged(r, *t, length, rate) for r, t in zip(runs, travels, strict=True)]
+    found = [
+        _averaged(r, *travel, still, length, rate)
+        for r, travel, still in zip(runs, travels, slow, strict=True)
+    ]
     if min(record.samples for record, *_ in found) < _FEWEST:
         return None
     made, speeds, directions = zip(*found, strict=True)
     seconds = sum(r.samples for r in runs) / rate
-    slow = sum(record.samples for record in made) / seconds
-    return Stations(replace(records, sample_rate_hz=slow, records=made), speeds, directions)
+    stations_hz = sum(record.samples for record in made) / seconds
+    return Stations(replace(records, sample_rate_hz=stations_hz, records=made), speeds, directions)
 
 
-def _inertia_share(record: Record, rate: float, inertia: float, noise_rad: float) -> float:
-    """Return the torque that inertia takes nearly all the time, over the recorded rms torque.
+def _inertia_share(record: Record, rate: float, inertia: float, noise_rad: float) -> np.ndarray:
+    """Return the torque that inertia takes at each sample, over the recorded rms torque.
 
     The position is averaged over as many samples as noise calls for, which feigns motion. Torque
     that is quicker than that may move the inertia unseen.
@@ -98,8 +103,8 @@ def _inertia_share(record: Record, rate: float, inertia: float, noise_rad: float
             if np.sqrt(np.mean((record.torque - torque) ** 2)) > _HIDDEN * whole:
                 break
             acceleration = np.abs(np.diff(position, 2)) * rate**2
-            return inertia * float(np.quantile(acceleration, 1.0 - _QUICK)) / whole
-    return np.inf
+            return inertia * np.pad(acceleration, 1, mode="edge") / whole
+    return np.full(record.samples, np.inf)
 
 
 def _travel(position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -122,10 +127,18 @@ def _travel(position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _averaged(
-    record: Record, moves: np.ndarray, direction: np.ndarray, length: float, rate: float
+    record: Record,
+    moves: np.ndarray,
+    direction: np.ndarray,
+    slow: np.ndarray,
+    length: float,
+    rate: float,
 ) -> tuple[Record, np.ndarray, np.ndarray]:
-    """Return a run averaged over ways of a length, with the speed and direction of each."""
-    moving = direction != 0.0
+    """Return a run averaged over ways of a length, with the speed and direction of each.
+
+    Where inertia takes torque, as between two speeds, it is left out.
+    """
+    moving = (direction != 0.0) & slow
     place = (np.cumsum(np.abs(moves)) / length).astype(int)[moving]
     direction = direction[moving]
     changes = (np.diff(place) != 0) | (np.diff(direction) != 0.0)

@@ -24,6 +24,8 @@ Progress = Callable[[str], None]
 _MAY_BE_UNSURE = 2
 SURE = 0.8
 """How surely a cause beyond the two that gain most must be present."""
+LEAST_BEARING = 0.2
+"""How surely a cause must be there that stays only because sure ones fail without it."""
 _TWICE = 0.15
 """Of what two near equivalents close: where each closes less beside the other, either alone does
 nearly all, and both together are one cause whose law has another form than the catalogue's."""
@@ -77,14 +79,15 @@ def kept(
     while steps[-1].effects:
         tested = tested or tests_of(steps[-1])
         stay = {*bearing, *_bases(fitter, tested, names)}
-        failed = [t for t in tested if not t.passed and t.effect not in stay]
-        failed = failed or _twice(fitter, steps[-1], tested)
-        guessed = [] if failed else [t for t in _guesses(tested) if t.effect not in stay]
+        free = _without(stay, tested)
+        failed = [t for t in free if not t.passed]
+        failed = failed or _without(stay, _twice(fitter, steps[-1], tested))
+        guessed = [] if failed else _without(stay, _guesses(tested))
         failed = failed or guessed
         if not failed:
             break
         blurred = any(t.passes_beside_size and not t.certain for t in failed)
-        weakest = min(tested if blurred else failed, key=lambda t: t.gain.mean)
+        weakest = min(free if blurred else failed, key=lambda t: t.gain.mean)
         before = [fit for fit in steps if weakest.effect not in fit.effects]
         in_time = time.monotonic() < until
         if in_time and weakest.effect not in replaced and len(steps[-1].effects) > 1:
@@ -97,7 +100,8 @@ def kept(
                 continue
         fewer = _taken_out(fitter, before, weakest)
         tests = tests_of(fewer[-1])
-        if (guessed or weakest.nearly_passes) and _bears(tested, tests):
+        nearly = weakest.nearly_passes and weakest.present >= LEAST_BEARING
+        if (guessed or nearly) and _bears(tested, tests):
             bearing.add(weakest.effect)
             continue
         notes += [*_changing(weakest), *_kin(weakest), *_bent(weakest)]
@@ -105,6 +109,10 @@ def kept(
     if tested and any(len(fit.effects) != count for count, fit in enumerate(steps)):
         steps = [steps[0], *_one_by_one(fitter, steps[-1], tested)]
     return replace(found, steps=steps, notes=tuple(notes)), tested
+
+
+def _without(names: set[str], tested: Sequence[Tested]) -> list[Tested]:
+    return [t for t in tested if t.effect not in names]
 
 
 def _bases(fitter: CellFitter, tested: Sequence[Tested], names: Sequence[str]) -> set[str]:

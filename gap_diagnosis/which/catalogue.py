@@ -12,9 +12,19 @@ from .search_space import possible_effects
 _OF_AN_ANGLE = ("gravity",)
 """What depends on the angle of a turn; of a linear axis weight is a constant force."""
 
+_OF_A_COMMAND = (
+    "delay", "actuator_lag", "torque_saturation", "torque_speed_limit", "torque_slew_limit",
+    "dead_band", "torque_constant_ripple", "torque_gain",
+)  # fmt: skip
+"""What changes a torque that is asked for; where none is, there is nothing to change."""
+
 
 def catalogue(
-    nominal: Mapping[str, float], asked: Sequence[str] | None = None, *, linear_axis: bool = False
+    nominal: Mapping[str, float],
+    asked: Sequence[str] | None = None,
+    *,
+    linear_axis: bool = False,
+    swings_free: bool = False,
 ) -> list[str]:
     """Return the effects that a rig can have, or those of them that were asked for.
 
@@ -25,6 +35,7 @@ def catalogue(
         nominal: datasheet values of the base parameters.
         asked: identifiers; None for all.
         linear_axis: whether the axis does not turn.
+        swings_free: whether no torque is asked for at any time.
 
     Raises:
         InputError: an identifier of no effect, or none that this rig can have.
@@ -35,6 +46,7 @@ def catalogue(
         for name in possible_effects(nominal)
         if (name in asked if asked is not None else not fx.EFFECTS[name].on_request)
         if not (linear_axis and name in _OF_AN_ANGLE)
+        if not (swings_free and name in _OF_A_COMMAND)
     ]
     if asked is not None and not found:
         raise InputError(

@@ -167,7 +167,10 @@ class _Search:
         return self.cost - float(linear @ linear) > _PROMISED * self.cost
 
     def _differentiate(self) -> None:
-        """Take one-sided finite differences, stepping away from a bound; known columns are free."""
+        """Take one-sided finite differences, stepping away from a bound; known columns are free.
+
+        What may not move has none.
+        """
         known, self._known = self._known, None
         first = 0 if known is None else known.shape[1]
         size = _STEP * np.maximum(np.abs(self.x), 1.0)
@@ -176,10 +179,11 @@ class _Search:
         self._updates = 0 if known is None else 1
         if known is not None:
             self.jacobian[:, :first] = known
-        if first < self.x.size:
-            points = (self.x + np.diag(steps))[first:]
-            columns = (self._residuals(points) - self.r) / steps[first:, None]
-            self.jacobian[:, first:] = columns.T
+        asked = first + np.flatnonzero((self._low < self._high)[first:])
+        if asked.size:
+            points = (self.x + np.diag(steps))[asked]
+            columns = (self._residuals(points) - self.r) / steps[asked, None]
+            self.jacobian[:, asked] = columns.T
 
     def _trial(self, damping: float) -> np.ndarray:
         """Return the damped Gauss-Newton point; what would leave its bounds is held."""

@@ -56,7 +56,8 @@ class ReweightedFits(Comparison):
 
     def refit(self) -> CellFit:
         """Fit the base parameters alone, from the datasheet."""
-        space = Space(self.nominal, (), (), self.tolerance, self.scales)
+        known = ("jm",) if self.evidence.swings_free else ()
+        space = Space(self.nominal, (), (), self.tolerance, self.scales, known)
         first = self._begun((), space, space.point(Model(self.nominal, {})))
         left = first.solution.residuals / self.weights.weight(first.variance)
         if self.weights.learn(left):

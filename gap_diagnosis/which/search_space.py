@@ -139,6 +139,7 @@ class Space:
         units: scale of each, float64.
         tolerance: how far a nominal value may be off.
         scales: of the record; None: effects have no bounds but their physical limits.
+        known: names of base parameters that are not free.
     """
 
     nominal: Mapping[str, float]
@@ -146,6 +147,7 @@ class Space:
     units: tuple[float, ...] = ()
     tolerance: float = TOLERANCE
     scales: Scales | None = None
+    known: tuple[str, ...] = ()
 
     def model(self, x: np.ndarray) -> Model:
         """Return the model at a point."""
@@ -188,7 +190,8 @@ class Space:
         """Return lower and upper bounds of a point."""
         low, high = [], []
         for name, value in self.nominal.items():
-            far = np.log1p(farthest(self.tolerance, _SCALES.get(name, _SCALE))) if value else 0.0
+            free = value and name not in self.known
+            far = np.log1p(farthest(self.tolerance, _SCALES.get(name, _SCALE))) if free else 0.0
             down, up = _within(name, value)
             low.append(-min(far, down))
             high.append(min(far, up))

@@ -40,6 +40,7 @@ class Seen:
         angle, velocity, acceleration: (samples,), of the motor.
         missing: (places,), as it is seen there, N m.
         seen: makes of a torque, (samples,), what is seen of it, (places,).
+        inertia: whether that of the model may be wrong.
     """
 
     model: Model
@@ -48,6 +49,7 @@ class Seen:
     acceleration: np.ndarray
     missing: np.ndarray
     seen: Callable[[np.ndarray], np.ndarray] = lambda torque: torque
+    inertia: bool = True
 
     def together(self, effects: Sequence[str]) -> list[tuple[tuple[str, ...], Model]]:
         """Return what only together explains the torque, each set with a model that has it.
@@ -101,7 +103,8 @@ class Seen:
         leave. No model where a spring pushes.
         """
         order = [n for n in laws if n != _OF_LOAD]
-        torques = [*(LAWS[n](self.velocity) for n in order), -self.acceleration]
+        torques = [LAWS[name](self.velocity) for name in order]
+        torques += [-self.acceleration] if self.inertia else []
         carried = load_torques(load, self.angle)
         columns = [self.seen(torque) for torque in (*torques, *carried)]
         sizes, left = solved(columns, self.missing, len(order))
@@ -111,8 +114,9 @@ class Seen:
             order.append(_OF_LOAD)
             sizes, left = solved(columns, self.missing, len(order))
         left = max(left, _SLIGHT * float(np.sum(self.missing**2)))
-        frictions, (inertia, *loads) = sizes[: len(order)], sizes[len(order) :]
-        seed = load_parameters(load, loads)
+        frictions, rest = sizes[: len(order)], sizes[len(order) :]
+        inertia = rest.pop(0) if self.inertia else 0.0
+        seed = load_parameters(load, rest)
         if seed is None:
             return None, left
         found = {name: size for name, size in zip(order, frictions, strict=True) if size}

@@ -52,6 +52,7 @@ class SeenTorques:
         every = max(int(rate / (_PER_CROSSOVER * simulator.crossover_hz)), 1)
         runs = sorted({evidence.parts[p].record for p in parts})
         self._simulator, self._every = simulator, every
+        self._swings_free = evidence.swings_free
         self._ends = np.cumsum([records[index].samples for index in runs])[:-1]
         self._places, columns, motions = [], [], []
         for index, missing in zip(runs, simulator.missing_torque(model, runs), strict=True):
@@ -98,7 +99,8 @@ class SeenTorques:
             return []
         angle, velocity, acceleration = self._motion
         columns = load_torques(effect, angle)
-        every = [*columns, velocity, np.sign(velocity), acceleration]
+        every = [*columns, velocity, np.sign(velocity)]
+        every += [] if self._swings_free else [acceleration]
         sizes, _ = solved([self._seen(column) for column in every], self._missing)
         seed = load_parameters(effect, sizes[: len(columns)])
         return [] if seed is None else [seed]
@@ -113,8 +115,9 @@ class SeenTorques:
         if rows.sum() < 8 * _PER_CROSSOVER or not np.isfinite(self._missing).all():
             return []
         seen = Seen(
-            self._model, *self._motion, self._missing[rows], lambda torque: self._seen(torque)[rows]
-        )
+            self._model, *self._motion, self._missing[rows],
+            lambda torque: self._seen(torque)[rows], not self._swings_free,
+        )  # fmt: skip
         return seen.together(effects)
 
     def friction(self, effect: str) -> list[Model]:
@@ -141,10 +144,12 @@ class SeenTorques:
         plant, effects = self._model.plant, self._model.effects
         angle, velocity, acceleration = self._motion
         follow = [n for n in LAWS if n not in names and plant.get(fx.parameter(n).adds_to)]
-        torques = [-acceleration, *(LAWS[name](velocity) for name in (*names, *follow))]
+        torques = [LAWS[name](velocity) for name in (*names, *follow)]
         torques += [np.ones(velocity.size), angle]
+        torques += [] if self._swings_free else [-acceleration]
         columns = [self._seen(torque)[rows] for torque in torques]
-        (inertia, *added), _ = solved(columns, self._missing[rows])
+        added, _ = solved(columns, self._missing[rows])
+        inertia = 0.0 if self._swings_free else added[-1]
         sizes = {n: effects.get(n, 0.0) + size for n, size in zip(names, added, strict=False)}
         return None if min(sizes.values()) <= 0.0 else heavier(self._model, inertia, sizes)
 
