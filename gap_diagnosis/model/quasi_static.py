@@ -66,9 +66,9 @@ def stations(records: RecordSet, nominal: Mapping[str, float]) -> Stations | Non
     noise = record_noise(records)
     noise_rad = noise.std_rad if noise.known else 0.0
     shares = [_inertia_share(r, rate, inertia, noise_rad) for r in runs]
-    if any(np.quantile(share, 1.0 - _QUICK) > _INERTIA_SHARE for share in shares):
-        return None
     slow = [share <= _INERTIA_SHARE for share in shares]
+    if any(np.mean(still) < 1.0 - _QUICK for still in slow):
+        return None
     travels = [_travel(r.position) for r in runs]
     length = sum(float(np.abs(moves).sum()) for moves, _ in travels) / _STATIONS
     if not length > 0.0:

@@ -22,13 +22,16 @@ LAWS: Mapping[str, Callable[[np.ndarray], np.ndarray]] = {
     "quadratic_friction.motor_nm_s2_rad2": lambda v: -v * np.abs(v),
 }
 """Laws of friction whose torque at a velocity is proportional to their size."""
-LACKED = ("coulomb_friction", "viscous_friction", "quadratic_friction")
+LACKED = ("coulomb_friction", "viscous_friction")
 """Frictions that a datasheet of inertias lacks."""
+_FALLING, _FALLS_AT = "stribeck_friction_motor.torque_nm", "stribeck_friction_motor.velocity_rad_s"
+_FALLEN = (0.01, 0.02, 0.04, 0.08, 0.16, 0.32)
+"""Of the usual speed: where friction may have fallen from breakaway."""
 _OF_LOAD = "load_friction.coefficient"
 _SLIGHT = 1e-6  # of the squares of the torque: less of it says nothing
 _NO_WORSE, _NEARLY_AS_WELL = 1.05, 1.3
 """Squares that are left over those of the best: a friction that explains no more is not needed; a
-load that leaves no more does as well."""
+load that leaves no more does as well, and what falls from breakaway must leave so much less."""
 
 
 @dataclass(frozen=True)
@@ -61,8 +64,52 @@ class Seen:
             Sets of two effects or more, the load last: the plainest one that does nearly as well as
             the best, and those as plain; the set that explains most first.
         """
-        laws = [name for name in LAWS if _effect(name) in LACKED and _effect(name) in effects]
-        loads = ["", *(load for load in LOADS if load in effects)]
+        return self._explaining(self._laws(effects), effects, {})
+
+    def falling(self, effects: Sequence[str]) -> list[tuple[tuple[str, ...], Model]]:
+        """Return the same with friction that falls from breakaway, where that leaves much less.
+
+        Args:
+            effects: identifiers of what may be there.
+        """
+        if not {"coulomb_friction", _effect(_FALLING)} <= set(effects):
+            return []
+        laws, loads = self._laws(effects), self._loads(effects)
+        usual = float(np.sqrt(np.mean(self.velocity**2)))
+        left = min(self._regressed(laws, load)[1] for load in loads)
+        found = []
+        for velocity in (usual * share for share in _FALLEN):
+            falls = -np.sign(self.velocity) * np.exp(-((self.velocity / velocity) ** 2))
+            with_it = {**laws, _FALLING: self.seen(falls)}
+            found.append(
+                (min(self._regressed(with_it, load)[1] for load in loads), velocity, with_it)
+            )
+        least, velocity, with_it = min(found, key=lambda f: f[0])
+        if _NEARLY_AS_WELL * least > left:
+            return []
+        sets = self._explaining(with_it, effects, {_FALLS_AT: velocity})
+        return [one for one in sets if {"coulomb_friction", _effect(_FALLING)} <= set(one[0])]
+
+    def _laws(self, effects: Sequence[str]) -> dict[str, np.ndarray]:
+        """Return what is seen of each law of friction, (places,), for a size of one."""
+        may_be = [name for name in LAWS if _effect(name) in effects]
+        return {name: self.seen(LAWS[name](self.velocity)) for name in may_be}
+
+    @staticmethod
+    def _loads(effects: Sequence[str]) -> list[str]:
+        return ["", *(load for load in LOADS if load in effects)]
+
+    def _explaining(
+        self, laws: Mapping[str, np.ndarray], effects: Sequence[str], shape: Mapping[str, float]
+    ) -> list[tuple[tuple[str, ...], Model]]:
+        """Return the sets of `together`.
+
+        Args:
+            laws: what is seen of each that may be needed, the commonest first.
+            effects: identifiers of what may be there.
+            shape: further parameters of the laws.
+        """
+        loads = self._loads(effects)
         left = {load: self._regressed(laws, load)[1] for load in loads}
         alike = [load for load in loads if left[load] <= _NEARLY_AS_WELL * min(left.values())]
         fewest = min(len(load_torques(load, self.angle)) for load in alike)
@@ -70,13 +117,16 @@ class Seen:
         found = []
         for load in sorted(plain, key=lambda load: left[load]):
             needed = self._needed(laws, load, effects)
-            model, names = self._regressed(needed, load)[0], [_effect(name) for name in needed]
-            names += [load] if load else []
+            names = [_effect(name) for name in needed] + ([load] if load else [])
+            model = self._regressed({n: laws.get(n) for n in needed}, load)[0]
             if len(names) > 1 and model is not None:
-                found.append((tuple(names), model))
+                own = {n: v for n, v in shape.items() if _effect(n) in names}
+                found.append((tuple(names), model.with_effects(own)))
         return found
 
-    def _needed(self, laws: Sequence[str], load: str, effects: Sequence[str]) -> list[str]:
+    def _needed(
+        self, laws: Mapping[str, np.ndarray], load: str, effects: Sequence[str]
+    ) -> list[str]:
         """Return the laws, and that of friction under load, without which more is left.
 
         What is needed least goes first, of two that do the same the law under load: beside a
@@ -85,41 +135,46 @@ class Seen:
         needed = list(laws)
         if load and _effect(_OF_LOAD) in effects:
             needed.append(_OF_LOAD)
-        least = _NO_WORSE * self._regressed(needed, load)[1]
+
+        def left(names: Sequence[str]) -> float:
+            return self._regressed({n: laws.get(n) for n in names}, load)[1]
+
+        least = _NO_WORSE * left(needed)
         while needed:
             fewer = [[o for o in needed if o != name] for name in reversed(needed)]
-            left, rest = min(
-                ((self._regressed(names, load)[1], names) for names in fewer), key=lambda f: f[0]
-            )
-            if left > least:
+            rest = min(fewer, key=left)
+            if left(rest) > least:
                 break
             needed = rest
         return needed
 
-    def _regressed(self, laws: Sequence[str], load: str) -> tuple[Model | None, float]:
+    def _regressed(
+        self, laws: Mapping[str, np.ndarray | None], load: str
+    ) -> tuple[Model | None, float]:
         """Return the model with laws and a load, inertia solved, too, and the squares left.
 
         No friction is below zero. Friction under load is that of the load which the laws without it
         leave. No model where a spring pushes.
         """
-        order = [n for n in laws if n != _OF_LOAD]
-        torques = [LAWS[name](self.velocity) for name in order]
-        torques += [-self.acceleration] if self.inertia else []
+        columns = [seen for seen in laws.values() if seen is not None]
+        order, frictions = [name for name in laws if name != _OF_LOAD], len(columns)
+        columns += [self.seen(-self.acceleration)] if self.inertia else []
         carried = load_torques(load, self.angle)
-        columns = [self.seen(torque) for torque in (*torques, *carried)]
-        sizes, left = solved(columns, self.missing, len(order))
+        first = len(columns)
+        columns += [self.seen(torque) for torque in carried]
+        sizes, left = solved(columns, self.missing, frictions)
         if _OF_LOAD in laws:
-            weight = np.abs(np.array(carried).T @ sizes[len(torques) :])
-            columns.insert(len(order), self.seen(-np.sign(self.velocity) * weight))
+            weight = np.abs(np.array(carried).T @ sizes[first:])
+            columns.insert(frictions, self.seen(-np.sign(self.velocity) * weight))
             order.append(_OF_LOAD)
             sizes, left = solved(columns, self.missing, len(order))
         left = max(left, _SLIGHT * float(np.sum(self.missing**2)))
-        frictions, rest = sizes[: len(order)], sizes[len(order) :]
+        rest = sizes[len(order) :]
         inertia = rest.pop(0) if self.inertia else 0.0
         seed = load_parameters(load, rest)
         if seed is None:
             return None, left
-        found = {name: size for name, size in zip(order, frictions, strict=True) if size}
+        found = {name: size for name, size in zip(order, sizes, strict=False) if size}
         return heavier(self.model, inertia, {**found, **seed}), left
 
 

@@ -28,9 +28,9 @@ FRICTIONS = tuple(name.split(".")[0] for name in LAWS)
 
 _PER_CROSSOVER = 8.0  # averages in a period of the observer's crossover
 _FASTEST = 1.0  # ripples of a higher frequency, over the crossover, the observer does not follow
-_REST, _SLIDES = 0.03, 0.2
-"""Of the rms velocity: below the one friction is whatever holds; above the other it slides, though
-it yields before."""
+_REST, _FALLS, _SLIDES = 0.03, 0.05, 0.2
+"""Of the rms velocity: below the first friction is whatever holds, above the second it may fall from
+breakaway; above the third it slides, though it yields before."""
 _PEAKS = 2
 _NEARLY, _ALIKE = 0.95, 4  # of the best; how many of those that explain so much
 
@@ -111,14 +111,21 @@ class SeenTorques:
         Args:
             effects: identifiers of what may be there.
         """
-        rows = np.abs(self._velocity) > _SLIDES * self._usual_speed
-        if rows.sum() < 8 * _PER_CROSSOVER or not np.isfinite(self._missing).all():
+        if not np.isfinite(self._missing).all():
             return []
-        seen = Seen(
+        found = []
+        for slowest, explained in ((_SLIDES, Seen.together), (_FALLS, Seen.falling)):
+            rows = np.abs(self._velocity) > slowest * self._usual_speed
+            if rows.sum() >= 8 * _PER_CROSSOVER:
+                found += explained(self._at(rows), effects)
+        return found
+
+    def _at(self, rows: np.ndarray) -> Seen:
+        """Return what is seen at some places."""
+        return Seen(
             self._model, *self._motion, self._missing[rows],
             lambda torque: self._seen(torque)[rows], not self._swings_free,
         )  # fmt: skip
-        return seen.together(effects)
 
     def friction(self, effect: str) -> list[Model]:
         """Return models with a law of friction more: alone, and with those of the fit solved anew.
