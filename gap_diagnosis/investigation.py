@@ -174,9 +174,7 @@ def investigate_runs(
     model = Model.nominal(nominal)
     linear_axis = any(record.description.linear for record in records.records)
     swings_free = not any(np.any(record.torque) for record in records.records)
-    names = catalogue(
-        model.plant, order.effects, linear_axis=linear_axis, swings_free=swings_free
-    )
+    names = catalogue(model.plant, order.effects, linear_axis=linear_axis, swings_free=swings_free)
     if order.drift and order.effects is None:
         names.append(DRIFT)
     if slow is None:

@@ -14,6 +14,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from fjr_sim_node import effects as fx
+
 from ..model.evidence import Evidence
 from ..model.rig_model import Model
 from .comparison import NOTHING_LEFT, CellFit, Comparison
@@ -122,13 +124,15 @@ class ReweightedFits(Comparison):
         """Return a fit with one effect taken out and all else fitted anew.
 
         Its weights begin with what is left where the effect is missing: with those of the fit, the
-        cells in which it acts would pull all other parameters away.
+        cells in which it acts would pull all other parameters away. A ripple that stays is the one
+        that it was: with as few cycles as it takes it would be whatever was taken out.
         """
         names = tuple(n for n in fit.space.effects if not n.startswith(f"{effect}."))
         units = tuple(
             u for n, u in zip(fit.space.effects, fit.space.units, strict=True) if n in names
         )
-        space = replace(fit.space, effects=names, units=units)
+        ripples = {n: fit.model.effects[n] for n in names if fx.parameter(n).role == "cycles"}
+        space = replace(fit.space, effects=names, units=units, cycles=ripples)
         rest = tuple(e for e in fit.effects if e != effect)
         return self._begun(rest, space, space.point(fit.model))
 

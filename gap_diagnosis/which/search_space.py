@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -32,6 +32,7 @@ _AT_LIMIT = 0.01  # of the way from the nominal to the bound
 _LEAST_LINK = 0.4  # of its inertia that a third mass leaves it at a start
 
 _COARSE_CYCLES = 11
+_ANOTHER = 2.0
 
 
 def farthest(tolerance: float, scale: float = _SCALE) -> float:
@@ -140,6 +141,8 @@ class Space:
         tolerance: how far a nominal value may be off.
         scales: of the record; None: effects have no bounds but their physical limits.
         known: names of base parameters that are not free.
+        cycles: ripples per turn, by full parameter name, from which a fit goes no further than by
+            a factor of two, either way: beyond, a ripple would be another one.
     """
 
     nominal: Mapping[str, float]
@@ -148,6 +151,7 @@ class Space:
     tolerance: float = TOLERANCE
     scales: Scales | None = None
     known: tuple[str, ...] = ()
+    cycles: Mapping[str, float] = field(default_factory=dict)
 
     def model(self, x: np.ndarray) -> Model:
         """Return the model at a point."""
@@ -200,6 +204,8 @@ class Space:
             least, most = (parameter.low, parameter.high)
             if self.scales is not None:
                 least, most = self.scales.bounds(name)
+            if near := self.cycles.get(name):
+                least, most = max(least, near / _ANOTHER), min(most, near * _ANOTHER)
             low.append(max(least / unit, -1e6))
             high.append(min(most / unit, 1e6))
         return np.array(low), np.array(high)

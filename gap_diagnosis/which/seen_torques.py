@@ -62,16 +62,18 @@ class SeenTorques:
                 begin = evidence.hop * part.windows.start + evidence.hop // 2
                 seen[begin : begin + evidence.hop * (part.windows.stop - part.windows.start)] = True
             velocity = np.gradient(_averaged(record.position, every)) * rate / every
-            missing = uniform_filter1d(missing, every)  # as the motion is averaged
-            signals = [_averaged(s, every) for s in (record.position, record.torque, missing)]
+            smooth = uniform_filter1d(missing, every)  # as the motion that it is compared with
+            signals = [
+                _averaged(s, every) for s in (record.position, record.torque, missing, smooth)
+            ]
             rows = _averaged(seen.astype(float), every) > 0.5
             acceleration = np.gradient(velocity) * rate / every
             columns.append(np.array([*signals, velocity, acceleration])[:, rows])
             self._places.append(rows)
             motions.append(_motion(record.position, every, rate))
         found: np.ndarray = np.concatenate(columns, axis=1)
-        self._angle, self._torque, self._missing = found[0], found[1], found[2]
-        self._velocity, self._acceleration = found[3], found[4]
+        self._angle, self._torque, self._missing, self._smooth = found[:4]
+        self._velocity, self._acceleration = found[4:]
         self._motion: np.ndarray = np.concatenate(motions, axis=1)
         self._usual_speed = float(np.sqrt(np.mean(self._velocity**2) + 1e-300))
 
@@ -101,7 +103,7 @@ class SeenTorques:
         columns = load_torques(effect, angle)
         every = [*columns, velocity, np.sign(velocity)]
         every += [] if self._swings_free else [acceleration]
-        sizes, _ = solved([self._seen(column) for column in every], self._missing)
+        sizes, _ = solved([self._seen(column) for column in every], self._smooth)
         seed = load_parameters(effect, sizes[: len(columns)])
         return [] if seed is None else [seed]
 
@@ -123,7 +125,7 @@ class SeenTorques:
     def _at(self, rows: np.ndarray) -> Seen:
         """Return what is seen at some places."""
         return Seen(
-            self._model, *self._motion, self._missing[rows],
+            self._model, *self._motion, self._smooth[rows],
             lambda torque: self._seen(torque)[rows], not self._swings_free,
         )  # fmt: skip
 
@@ -155,7 +157,7 @@ class SeenTorques:
         torques += [np.ones(velocity.size), angle]
         torques += [] if self._swings_free else [-acceleration]
         columns = [self._seen(torque)[rows] for torque in torques]
-        added, _ = solved(columns, self._missing[rows])
+        added, _ = solved(columns, self._smooth[rows])
         inertia = 0.0 if self._swings_free else added[-1]
         sizes = {n: effects.get(n, 0.0) + size for n, size in zip(names, added, strict=False)}
         return None if min(sizes.values()) <= 0.0 else heavier(self._model, inertia, sizes)
