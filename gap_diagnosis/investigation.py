@@ -25,7 +25,7 @@ from .model.record_length import within
 from .model.rig_model import Model
 from .model.steady_runs import SteadyRuns
 from .outcome.diagnosis import Bags, Diagnosis
-from .outcome.verdict_words import OUT_OF_TIME, ROUNDING
+from .outcome.verdict_words import LOST, OUT_OF_TIME, ROUNDING, SWINGS_FREE
 from .verdict.coarse_encoder import with_coarse_encoder
 from .verdict.judgement import PLAIN, judge
 from .verdict.kept_causes import kept
@@ -49,17 +49,6 @@ Progress = Callable[[str], None]
 ASSUMED = (
     "How far friction scatters from run to run cannot be seen in these runs; the intervals allow "
     f"for {100 * SCATTER:.0f} %. Two runs more than levels that all move enough show it."
-)
-
-SWINGS_FREE = (
-    "No run has a torque, so that all sizes show only as ratios to the inertia: that of the motor "
-    "is taken from the datasheet, and all other sizes are off as far as it is."
-)
-
-LOST = (
-    "The best explanation still misses more than the whole motion, so it predicts nothing and none "
-    "of its causes is named: check the datasheet, the factor of the torque, and whether the runs "
-    "are sampled fast enough for the rig."
 )
 
 _HOPELESS = 5.0

@@ -13,6 +13,16 @@ ROUNDING = "encoder_quantization"
 """The effect that acts like noise in a loop, and is judged by its statistics."""
 OUT_OF_TIME = "The time budget ended the search before all effects were tried."
 """Note of a diagnosis whose search was cut."""
+SWINGS_FREE = (
+    "No run has a torque, so that all sizes show only as ratios to the inertia: that of the motor "
+    "is taken from the datasheet, and all other sizes are off as far as it is."
+)
+
+LOST = (
+    "The best explanation still misses more than the whole motion, so it predicts nothing and none "
+    "of its causes is named: check the datasheet, the factor of the torque, and whether the runs "
+    "are sampled fast enough for the rig."
+)
 _CUT = (
     "A gap remains after the refit, and the time budget ended the search for its cause. That is "
     "no proof that no effect of the catalogue explains it: give a greater --budget, or --effects."

@@ -216,7 +216,7 @@ def solved(
     """
     scales = [float(np.sqrt(np.mean(column**2))) or 1.0 for column in columns]
     scaled = np.array(columns).T / scales
-    corner = np.linalg.qr(np.column_stack([scaled, torque]), mode="r")
+    corner = np.linalg.qr(np.column_stack([scaled, torque])).R  # as good as all rows
     if positive:
         least = np.where(np.arange(len(scales)) < positive, 0.0, -np.inf)
         sizes = lsq_linear(corner[:, :-1], corner[:, -1], (least, np.inf), method="bvls").x

@@ -29,8 +29,8 @@ FRICTIONS = tuple(name.split(".")[0] for name in LAWS)
 _PER_CROSSOVER = 8.0  # averages in a period of the observer's crossover
 _FASTEST = 1.0  # ripples of a higher frequency, over the crossover, the observer does not follow
 _REST, _FALLS, _SLIDES = 0.03, 0.05, 0.2
-"""Of the rms velocity: below the first friction is whatever holds, above the second it may fall from
-breakaway; above the third it slides, though it yields before."""
+"""Of the rms velocity: below the first friction is whatever holds, above the second it may fall
+from breakaway; above the third it slides, though it yields before."""
 _PEAKS = 2
 _NEARLY, _ALIKE = 0.95, 4  # of the best; how many of those that explain so much
 
@@ -124,8 +124,9 @@ class SeenTorques:
 
     def _at(self, rows: np.ndarray) -> Seen:
         """Return what is seen at some places."""
+        angle, velocity, acceleration = self._motion
         return Seen(
-            self._model, *self._motion, self._smooth[rows],
+            self._model, angle, velocity, acceleration, self._smooth[rows],
             lambda torque: self._seen(torque)[rows], not self._swings_free,
         )  # fmt: skip
 

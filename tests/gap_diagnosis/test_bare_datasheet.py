@@ -9,8 +9,9 @@ import pytest
 from test_evidence import NOMINAL, records
 
 from gap_diagnosis.any_record import investigate
-from gap_diagnosis.investigation import LOST, Investigation, Order, investigate_runs
+from gap_diagnosis.investigation import Investigation, Order, investigate_runs
 from gap_diagnosis.model.evidence import Evidence
+from gap_diagnosis.outcome.verdict_words import LOST
 from gap_diagnosis.which.cell_fits import CellFitter
 from gap_diagnosis.which.equivalents import founded
 from gap_diagnosis.which.exchange import replace_bounded

@@ -1,0 +1,245 @@
+"""Does a diagnosis find what plain machines have, where their datasheet is an inertia alone?
+
+Run `python benchmarks/plain_machines.py --kind swing --cases 12 --seed 0`, and so for `stairs` and
+`fan`. All are integrated here by laws of their own, not by the simulator that the diagnosis fits;
+their friction scatters by 2 % from run to run, beside a torque that wanders.
+
+- `swing`: a pendulum that is let go without a motor, twice to four times from other angles; it has
+  gravity, Coulomb and viscous friction. Only ratios to its inertia show.
+- `stairs`: a drive whose speed loop holds one speed after the other, both ways, up to a greatest
+  one, as friction is measured; Coulomb and viscous friction, half of them with breakaway above.
+- `fan`: a drive that steps its torque and logs speed in rpm; the load grows with its square, beside
+  Coulomb and viscous friction.
+
+Counted are what is missed, what is named but is not there, the ratio of each size to the truth
+(of a swing, both over their inertia), and how many of the intervals hold it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numba
+import numpy as np
+from machine import describe
+from robot_joint import wandering
+
+from fjr_records.importers.import_map import parse_map
+from fjr_records.importers.importer import ImportOptions, import_files
+from gap_diagnosis import read_nominal
+from gap_diagnosis.any_record import diagnose
+from gap_diagnosis.outcome.diagnosis import Diagnosis
+
+BRISTLE_RAD, ACCELERATES_S, INNER_HZ = 0.003, 0.5, 8000.0
+SIZES = {
+    "gravity.torque_nm": "gravity",
+    "coulomb_friction.motor_nm": "coulomb",
+    "viscous_friction.motor_nm_s_rad": "viscous",
+    "quadratic_friction.motor_nm_s2_rad2": "quadratic",
+    "stribeck_friction_motor.torque_nm": "breakaway",
+}
+
+
+@dataclass(frozen=True)
+class Machine:
+    """A random machine and its records.
+
+    Attributes:
+        truth: inertia, and sizes by the names of `SIZES`.
+        rate_hz: of the records.
+        runs: (columns, samples) of each: time, position or speed, torque.
+        position: unit of the second column.
+        swings: whether sizes show over the inertia only.
+    """
+
+    truth: dict[str, float]
+    rate_hz: float
+    runs: list[np.ndarray]
+    position: str = "1"
+    swings: bool = False
+
+    def recorded(self, folder: Path, told: float) -> None:
+        """Import the records and write a datasheet with an inertia."""
+        folder.mkdir()
+        files = [folder / f"run_{number}.csv" for number in range(len(self.runs))]
+        for file, run in zip(files, self.runs, strict=True):
+            np.savetxt(file, run.T, fmt="%.9g", delimiter=",", header="t,q,tau", comments="")
+        columns = parse_map(["time=t", "torque=tau:1", f"position=q:{self.position}"])
+        import_files(files, folder / "bags", ImportOptions(columns=columns))
+        (folder / "nominal.yaml").write_text(f"{{jm: {told!r}, k0: .inf}}\n")
+
+
+@numba.njit  # type: ignore[untyped-decorator]
+def moved(
+    wanted, gain, integral, angle, inertia, gravity, coulomb, viscous, quadratic, breakaway, fallen,
+    pushed, step, rate_hz, inner,
+):  # fmt: skip
+    """Return position, mean torque and speed; with a gain it is wanted speeds, else torques."""
+    dt, speed, bristle, sum_, torque = 1.0 / (rate_hz * inner), 0.0, 0.0, 0.0, 0.0
+    every, found = max(inner // 20, 1), np.zeros((3, wanted.size))
+    for k in range(wanted.size):
+        found[0, k], found[2, k] = np.round(angle / step) * step, speed
+        for i in range(inner):
+            if gain == 0.0:
+                torque = wanted[k]
+            elif i % every == 0:
+                error = wanted[k] - speed
+                sum_ += integral * error * dt * every
+                torque = gain * error + sum_
+            level = coulomb + breakaway * np.exp(-((speed / fallen) ** 2))
+            ends = BRISTLE_RAD if speed >= 0.0 else -BRISTLE_RAD
+            bristle = ends + (bristle - ends) * np.exp(-abs(speed) * dt / BRISTLE_RAD)
+            lost = level * bristle / BRISTLE_RAD + viscous * speed + quadratic * abs(speed) * speed
+            speed += dt * (torque + pushed[k] - lost - gravity * np.sin(angle)) / inertia
+            angle += dt * speed
+            found[1, k] += torque / inner
+    return found
+
+
+def run_of(
+    truth: dict[str, float], wanted: np.ndarray, rate_hz: float, rng: np.random.Generator,
+    wanders: float, *, gain: float = 0.0, integral: float = 0.0, angle: float = 0.0,
+    fallen: float = 1.0, step: float = 1e-6,
+) -> np.ndarray:  # fmt: skip
+    """Return position, torque and speed of one run, (3, samples)."""
+    share, size = 1.0 + 0.02 * rng.standard_normal(), truth.get
+    return moved(
+        wanted, gain, integral, angle, truth["inertia"], size("gravity", 0.0),
+        share * truth["coulomb"], share * truth["viscous"], size("quadratic", 0.0),
+        share * size("breakaway", 0.0), fallen,
+        wanders * truth["coulomb"] * wandering(rng, wanted.size, rate_hz), step, rate_hz,
+        max(int(INNER_HZ / rate_hz), 20),
+    )  # fmt: skip
+
+
+def swing(rng: np.random.Generator) -> Machine:
+    """Draw a pendulum that is let go."""
+    rate, seconds = float(rng.choice([100, 200, 500])), float(rng.choice([5, 10, 20]))
+    inertia, natural = 10.0 ** rng.uniform(-3, 0.5), rng.uniform(3, 9)
+    gravity = inertia * natural**2
+    truth = {
+        "inertia": inertia,
+        "gravity": gravity,
+        "coulomb": gravity * rng.uniform(0.005, 0.06),
+        "viscous": 2.0 * inertia * natural * rng.uniform(0.005, 0.06),
+    }
+    step = 2.0 * np.pi / float(rng.choice([2**12, 2**14, 2**17]))
+    nothing, runs = np.zeros(int(rate * seconds)), []
+    for _ in range(rng.integers(2, 5)):
+        angle = rng.uniform(0.6, 2.5) * rng.choice([-1, 1])
+        found = run_of(truth, nothing, rate, rng, 0.01, angle=angle, step=step)
+        runs.append(np.array([np.arange(nothing.size) / rate, found[0], nothing]))
+    return Machine(truth, rate, runs, swings=True)
+
+
+def stairs(rng: np.random.Generator) -> Machine:
+    """Draw a drive that holds one speed after the other."""
+    rate, inertia = float(rng.choice([50, 100, 250])), 10.0 ** rng.uniform(-4, 0.5)
+    fastest, hold = rng.uniform(2, 60), float(rng.choice([2, 4]))
+    most = inertia * fastest / ACCELERATES_S * rng.uniform(0.5, 4)
+    truth = {"inertia": inertia, "coulomb": most * rng.uniform(0.2, 0.7)}
+    truth["viscous"] = (most - truth["coulomb"]) / fastest
+    fallen = fastest * rng.uniform(0.02, 0.1)
+    if rng.random() < 0.5:
+        truth["breakaway"] = 0.5 * truth["coulomb"]
+    speeds = fastest * np.geomspace(0.02, 1.0, int(rng.integers(5, 9)))
+    asked = np.concatenate([np.full(int(hold * rate), s) for one in speeds for s in (one, -one)])
+    asked = np.concatenate([np.zeros(int(rate)), asked])
+    wanted, most_change = np.zeros_like(asked), fastest / ACCELERATES_S / rate
+    for k in range(1, asked.size):
+        wanted[k] = wanted[k - 1] + np.clip(asked[k] - wanted[k - 1], -most_change, most_change)
+    step, bandwidth = 2.0 * np.pi / float(rng.choice([2**12, 2**16])), 20.0 * rng.uniform(1, 3)
+    gain, integral, runs = inertia * bandwidth, inertia * bandwidth**2 / 4.0, []
+    for _ in range(rng.integers(1, 4)):
+        found = run_of(
+            truth, wanted, rate, rng, 0.03, gain=gain, integral=integral, fallen=fallen, step=step
+        )
+        torque = found[1] + 0.02 * most * rng.standard_normal(wanted.size)
+        runs.append(np.array([np.arange(wanted.size) / rate, found[0], torque]))
+    return Machine(truth, rate, runs)
+
+
+def fan(rng: np.random.Generator) -> Machine:
+    """Draw a drive whose load grows with the square of its speed."""
+    rate, seconds = float(rng.choice([20, 50, 100])), float(rng.choice([60, 120]))
+    inertia, fastest = 10.0 ** rng.uniform(-5, -1), rng.uniform(50, 400)
+    slow = rng.uniform(0.5, 4)
+    most = inertia * fastest / slow
+    truth = {
+        "inertia": inertia,
+        "coulomb": most * rng.uniform(0.03, 0.2),
+        "viscous": most * rng.uniform(0.03, 0.2) / fastest,
+        "quadratic": most * rng.uniform(0.4, 0.8) / fastest**2,
+    }
+    samples, hold, runs = int(rate * seconds), int(3 * slow * rate), []
+    for _ in range(rng.integers(1, 4)):
+        asked = np.repeat(most * rng.uniform(0.1, 1.0, samples // hold + 1), hold)[:samples]
+        found = run_of(truth, asked, rate, rng, 0.02)
+        speed = found[2] + 0.002 * fastest * rng.standard_normal(samples)
+        torque = found[1] + 0.01 * most * rng.standard_normal(samples)
+        runs.append(np.array([np.arange(samples) / rate, speed * 30.0 / np.pi, torque]))
+    return Machine(truth, rate, runs, position="rpm")
+
+
+KINDS: dict[str, Callable[[np.random.Generator], Machine]] = {
+    "swing": swing, "stairs": stairs, "fan": fan,
+}  # fmt: skip
+
+
+def row(number: int, machine: Machine, found: Diagnosis, spent_s: float) -> str:
+    """Return a line of the table."""
+    there = {name.split(".")[0] for name, size in SIZES.items() if size in machine.truth}
+    named = {e for cause in found.causes for e in (cause.effect, *cause.others)}
+    wrong = [
+        c.effect
+        for c in found.causes
+        if not {c.effect, *c.others} & (there | {"presliding_friction"})
+    ]
+    unit = machine.truth["inertia"] / found.parameters["jm"].value if machine.swings else 1.0
+    ratios, inside = [], []
+    for name, size in {"jm": "inertia", **SIZES}.items():
+        true, size_found = machine.truth.get(size), found.parameters.get(name)
+        if true is None or size_found is None:
+            ratios.append("-")
+            continue
+        ratios.append(f"{unit * size_found.value / true:.2f}")
+        if not (machine.swings and name == "jm"):
+            inside.append(size_found.low * unit <= true <= size_found.high * unit)
+    return (
+        f"| {number} | {len(machine.runs)} x {machine.runs[0].shape[1] / machine.rate_hz:.0f} s, "
+        f"{machine.rate_hz:.0f} Hz | {', '.join(sorted(there - named)) or '-'} | "
+        f"{', '.join(wrong) or '-'} | {' | '.join(ratios)} | {sum(inside)} of {len(inside)} | "
+        f"{spent_s:.0f} |"
+    )
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description="Plain machines beside a datasheet of inertia.")
+    parser.add_argument("--kind", choices=sorted(KINDS), required=True)
+    parser.add_argument("--cases", type=int, default=12)
+    parser.add_argument("--seed", type=int, default=0)
+    given = parser.parse_args()
+    print(describe() + "\n")
+    print(f"| {given.kind} | log | missed | wrong | inertia | {' | '.join(SIZES.values())} | "
+          "in 95 % | CPU s |")  # fmt: skip
+    print("|---" * (6 + len(SIZES) + 1) + "|", flush=True)
+    for number in range(given.cases):
+        rng = np.random.default_rng([given.seed, number])
+        machine = KINDS[given.kind](rng)
+        with tempfile.TemporaryDirectory() as folder:
+            case = Path(folder) / "machine"
+            machine.recorded(case, machine.truth["inertia"] * float(rng.choice([0.9, 1.1])))
+            begun = time.process_time()
+            found = diagnose(case / "bags", read_nominal(case / "nominal.yaml"))
+            spent = time.process_time() - begun
+        print(row(number, machine, found, spent), flush=True)
+
+
+if __name__ == "__main__":
+    main()
