@@ -29,6 +29,7 @@ _FALLEN = (0.01, 0.02, 0.04, 0.08, 0.16, 0.32)
 """Of the usual speed: where friction may have fallen from breakaway."""
 _OF_LOAD = "load_friction.coefficient"
 _SLIGHT = 1e-6  # of the squares of the torque: less of it says nothing
+_SAME = 1e-3  # relative: squares that differ by less are the same
 _NO_WORSE, _NEARLY_AS_WELL = 1.05, 1.3
 """Squares that are left over those of the best: a friction that explains no more is not needed; a
 load that leaves no more does as well, and what falls from breakaway must leave so much less."""
@@ -142,10 +143,11 @@ class Seen:
         least = _NO_WORSE * left(needed)
         while needed:
             fewer = [[o for o in needed if o != name] for name in reversed(needed)]
-            rest = min(fewer, key=left)
-            if left(rest) > least:
+            lefts = [left(names) for names in fewer]
+            if min(lefts) > least:
                 break
-            needed = rest
+            as_well = (1.0 + _SAME) * min(lefts)
+            needed = next(n for n, each in zip(fewer, lefts, strict=True) if each <= as_well)
         return needed
 
     def _regressed(

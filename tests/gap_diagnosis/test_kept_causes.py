@@ -14,6 +14,7 @@ from gap_diagnosis.outcome.diagnosis import Estimate
 from gap_diagnosis.verdict import kept_causes as kept_causes_module
 from gap_diagnosis.verdict.kept_causes import (
     SURE,
+    _bases,
     _bears,
     _begun_anew,
     _bent,
@@ -31,6 +32,7 @@ from gap_diagnosis.which.found import Found
 from gap_diagnosis.which.gains import Gain, beside_others
 from gap_diagnosis.which.presence import beyond_zero
 
+SURELY = Gain(30.0, 25.0, 1.0, 1e-5)
 CAUSES = {"torque_bias.torque_nm": 4.0, "delay.time_s": 1e-3}
 
 
@@ -363,3 +365,37 @@ def test_starts_of_effects_are_looked_at_until_one_promises(searched, first, ask
     found = search._proposed(fits[0], screened, 1)
     assert len(found) == asked and "torque_bias" in found
     assert fitter.promises(fits[0], found["torque_bias"])
+
+
+def test_what_fails_again_and_again_ends(searched, monkeypatch):
+    """Of two that look alike one stays since others fail without it: then the other one goes."""
+    fitter, fits = searched
+    calls = []
+
+    def tests_of(*args):
+        calls.append(1)
+        assert len(calls) < 20
+        return causes_with_tests(*args)
+
+    monkeypatch.setattr(kept_causes_module, "causes_with_tests", tests_of)
+    monkeypatch.setattr(kept_causes_module, "_twice", lambda fitter, best, tested: list(tested))
+    monkeypatch.setattr(kept_causes_module, "_bears", lambda tested, without: True)
+    monkeypatch.setattr(kept_causes_module, "LEAST_BEARING", 0.0)
+    found, tested = kept(fitter, Found(fits), SCATTER, lambda _: None, fits[-1].effects)
+    assert len(tested) == len(found.best.effects) <= 2
+
+
+def test_what_passing_causes_modify_stays_where_the_datasheet_lacks_it(searched):
+    fitter, fits = searched
+    bare = {**NOMINAL, "fs": 0.0, "fsm": 0.0}
+    without = CellFitter(Evidence(records(runs=1, seconds=4.0), bare), bare, 0.1)
+    first, second, _ = causes_with_tests(fitter, fits[3], fits[0], SCATTER)
+    base = replace(first, effect="coulomb_friction", certain=True, invariance_p=None)
+    falls = replace(second, effect="stribeck_friction_motor", certain=True, gain=SURELY)
+    falls = replace(falls, in_band=0.99, bounded=None, left=0.0, over_noise=0.0)
+    assert falls.passed
+    names = ("coulomb_friction", "stribeck_friction_motor")
+    assert _bases(without, [base, falls], names) == {"coulomb_friction"}
+    assert _bases(without, [replace(base, certain=False), falls], names) == set()
+    assert _bases(without, [base, replace(falls, certain=False)], names) == set()
+    assert _bases(fitter, [base, falls], names) == set()  # whose datasheet has friction

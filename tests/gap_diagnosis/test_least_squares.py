@@ -87,3 +87,15 @@ def test_a_step_that_stays_where_it_is_gains_nothing(seed):
         found = solve(residuals, np.zeros(2), *FREE)
     assert found.converged and not found.jacobian.any()
     assert found.x.tolist() == [0.0, 0.0]
+
+
+def test_what_may_not_move_is_not_tried():
+    tried = []
+
+    def residuals(points):
+        tried.extend(points[:, 0].tolist())
+        return rosenbrock(points)
+
+    found = solve(residuals, np.array([2.0, 1.0]), np.array([2.0, -10.0]), FREE[1] * [0.2, 1.0])
+    assert set(tried) == {2.0} and found.x == pytest.approx([2.0, 4.0], abs=1e-3)
+    assert not found.jacobian[:, 0].any() and found.jacobian[:, 1].any()

@@ -15,10 +15,11 @@ from fjr_sim_node import effects as fx
 from fjr_sim_node.plant import PLANT, coefficients
 from fjr_sim_node.simulation.closed_loop import simulate
 from gap_diagnosis.any_record import investigate
-from gap_diagnosis.investigation import LOST, Investigation, Order, investigate_runs
+from gap_diagnosis.investigation import Investigation, Order, investigate_runs
 from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.model.quasi_static import stations
 from gap_diagnosis.model.rig_model import Model
+from gap_diagnosis.outcome.verdict_words import LOST
 from gap_diagnosis.report.gap_output import write_diagnosis
 
 RATE, KEPT = 1000.0, 20
@@ -214,3 +215,25 @@ def test_torque_quicker_than_what_noise_hides_is_no_slow_motion():
         5.0 * time + noise, rate, lambda y, v: 0.1 + 0.2 * np.sin(2 * np.pi * 60.0 * time), 0.02
     )
     assert stations(records, {**ROTOR, "jm": 2e-4}) is None
+
+
+def test_where_inertia_takes_torque_between_two_speeds_nothing_is_compared():
+    rate, jm = 100.0, 2e-3
+    speed = np.repeat([0.5, -0.5, 2.0, -2.0, 1.0, -1.0], int(8.0 * rate))
+    speed = uniform_filter1d(speed, 31)
+    torque = 0.05 * np.sign(speed) + 0.01 * speed
+    accelerating = jm * np.gradient(speed) * rate
+    assert np.abs(accelerating).max() > 0.3 * np.abs(torque).max()
+    description = RecordDescription.of(
+        "test", sample_rate_hz=rate, level=0, levels=1, realization=0, realizations=1,
+        controller=None,
+    )  # fmt: skip
+    position = np.cumsum(speed) / rate
+    runs = RecordSet(
+        "test", rate, (Record("run", description, None, torque + accelerating, position, None),)
+    )
+    found = stations(runs, {**NOMINAL, "jm": jm, "j": 0.0, "k0": np.inf})
+    assert found is not None
+    (record,), (of_speed,), (way,) = found.records.records, found.speeds, found.directions
+    left = record.torque - 0.05 * way - 0.01 * of_speed
+    assert np.mean(np.abs(left) > 0.05 * np.abs(torque).max()) < 0.01

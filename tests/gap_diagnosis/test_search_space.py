@@ -144,3 +144,15 @@ def test_the_paper_s_rig_starts_where_its_effects_usually_are():
                        rtol=0.05)  # fmt: skip
     assert values("delay", "time_s")[0] == pytest.approx(1e-4)
     assert PAPER_LIKE.bounds("extra_mode.frequency_hz") == pytest.approx((2.0, 120.0))
+
+
+def test_what_is_known_is_not_free_and_a_ripple_stays_the_one_that_it_was():
+    nominal = {"jm": 0.2, "fsm": 0.0, "fvm": 0.0}
+    start = {"cogging.amplitude_nm": 2.0, "cogging.cycles_per_turn": 40.0, "cogging.phase_rad": 0.0}
+    free = space_for(nominal, start, PAPER_LIKE)
+    near = replace(free, known=("jm",), cycles={"cogging.cycles_per_turn": 40.0})
+    at = 3 + free.effects.index("cogging.cycles_per_turn")
+    low, high = near.bounds()
+    assert low[0] == high[0] == 0.0 and free.bounds()[0][0] < 0.0 < free.bounds()[1][0]
+    assert low[at] == pytest.approx(0.5) and high[at] == pytest.approx(2.0)
+    assert free.bounds()[0][at] < 0.5 and free.bounds()[1][at] > 2.0

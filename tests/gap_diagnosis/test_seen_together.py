@@ -163,3 +163,32 @@ def test_a_motor_that_would_run_away_without_the_friction_that_its_datasheet_lac
     assert found.diagnosis.steps[-1].nrmse_position < 0.02
     size = found.diagnosis.parameters["coulomb_friction.motor_nm"]
     assert size.value == pytest.approx(motor["fsm"], rel=0.05)
+
+
+def test_friction_that_falls_is_seen_only_where_it_is():
+    stamps = np.arange(8000) / 100.0
+    angle = 1.2 * np.sin(0.9 * stamps) + 0.5 * np.sin(2.3 * stamps + 1.0)
+    velocity, acceleration = np.gradient(angle) * 100.0, np.gradient(np.gradient(angle)) * 1e4
+    rows = np.abs(velocity) > 0.05
+    angle, velocity, acceleration = angle[rows], velocity[rows], acceleration[rows]
+    for level, there in ((0.0, False), (0.6, True)):
+        falls = level * np.exp(-((velocity / 0.25) ** 2))
+        missing = -(1.0 + falls) * np.sign(velocity) - 0.5 * velocity - 0.3 * acceleration
+        missing += 0.02 * np.random.default_rng(1).standard_normal(missing.size)
+        found = Seen(BARE, angle, velocity, acceleration, missing).falling(
+            (*EVERY, "stribeck_friction_motor")
+        )
+        assert bool(found) == there
+    names, model = found[0]
+    assert names == ("coulomb_friction", "viscous_friction", "stribeck_friction_motor")
+    assert model.effects["stribeck_friction_motor.torque_nm"] == pytest.approx(0.6, rel=0.3)
+    assert model.effects["stribeck_friction_motor.velocity_rad_s"] == pytest.approx(0.25, rel=0.5)
+    assert model.effects["coulomb_friction.motor_nm"] == pytest.approx(1.0, rel=0.1)
+    assert Seen(BARE, angle, velocity, acceleration, missing).falling(EVERY) == []
+
+
+def test_no_friction_is_below_zero_and_of_two_that_do_the_same_the_plainer_stays():
+    sizes, _ = solved([np.array([1.0, 0.0]), np.array([0.0, 1.0])], np.array([-1.0, -2.0]), 1)
+    assert sizes == pytest.approx([0.0, -2.0])
+    held = seen(0.1, 1.0, 0.5, load=lambda q: 0.4 + 0.0 * q, noise=0.01)
+    assert held.together(EVERY)[0][0] == ("coulomb_friction", "viscous_friction", "torque_bias")

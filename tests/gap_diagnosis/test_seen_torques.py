@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from test_evidence import NOMINAL, records
 
 from gap_diagnosis.model.evidence import Evidence
+from gap_diagnosis.model.record_rig import RecordSimulator
 from gap_diagnosis.model.rig_model import Model
 from gap_diagnosis.which.cell_fits import CellFitter
 from gap_diagnosis.which.seen_torques import SeenTorques, _best
@@ -92,3 +95,24 @@ def test_a_spring_that_pushes_is_no_spring():
     fitter = CellFitter(Evidence(records(truth), NOMINAL), NOMINAL, 0.1)
     seen = SeenTorques(fitter.evidence, fitter.fit_parts, Model(NOMINAL, {}))
     assert seen.load("external_spring") == []
+
+
+@pytest.mark.parametrize("lasts_s", [4.0, 0.05])
+def test_what_an_observer_adds_for_a_torque_is_known(lasts_s):
+    """A steady torque is seen whole, a quick one late and smaller: both as the simulation says."""
+    evidence = Evidence(records(known=False), NOMINAL)
+    simulator = evidence.simulator
+    model = Model({**NOMINAL, "fs": 0.0, "fsm": 0.0, "k1": 0.0}, {})
+    record = evidence.records.records[0]
+    stamps = np.arange(record.samples) / evidence.records.sample_rate_hz
+    torque = 3.0 * np.sign(np.sin(np.pi * stamps / lasts_s))
+    pushed = replace(record, torque=record.torque + torque)
+    other = RecordSimulator(
+        replace(evidence.records, records=(pushed,)), evidence.noise,
+        evidence.lines * evidence.line_hz, NOMINAL,
+    )  # fmt: skip
+    added = simulator.missing_torque(model, [0])[0] - other.missing_torque(model, [0])[0]
+    expected = simulator.added_for(torque, model)
+    late = slice(int(0.5 * evidence.records.sample_rate_hz), None)
+    assert np.std(added[late] - expected[late]) < 0.02 * np.std(expected[late])
+    assert (np.std(expected[late]) > 0.9 * 3.0) == (lasts_s > 1.0)
