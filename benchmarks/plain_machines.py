@@ -196,11 +196,7 @@ def row(number: int, machine: Machine, found: Diagnosis, spent_s: float) -> str:
     """Return a line of the table."""
     there = {name.split(".")[0] for name, size in SIZES.items() if size in machine.truth}
     named = {e for cause in found.causes for e in (cause.effect, *cause.others)}
-    wrong = [
-        c.effect
-        for c in found.causes
-        if not {c.effect, *c.others} & (there | ALSO)
-    ]
+    wrong = [c.effect for c in found.causes if not {c.effect, *c.others} & (there | ALSO)]
     unit = machine.truth["inertia"] / found.parameters["jm"].value if machine.swings else 1.0
     ratios, inside = [], []
     for name, size in {"jm": "inertia", **SIZES}.items():

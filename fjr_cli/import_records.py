@@ -47,6 +47,14 @@ def import_records(
             "each in their order. Gains may be unknown."
         ),
     ] = None,
+    swings_free: Annotated[
+        bool,
+        typer.Option(
+            "--swings-free",
+            help="No torque acts, and none is mapped: a pendulum that is let go, a drive that is "
+            "switched off.",
+        ),
+    ] = False,
     sample_rate_hz: Annotated[
         float | None,
         typer.Option(
@@ -102,6 +110,7 @@ def import_records(
         columns=parse_map(
             [part for spec in column_map for part in spec.split(",")],
             described=bool(controller),
+            swings_free=swings_free,
         ),
         sample_rate_hz=sample_rate_hz,
         samples_per_period=samples_per_period,
@@ -113,6 +122,7 @@ def import_records(
         levels=levels,
         repeat_reference=repeat_reference,
         controllers=tuple(controller or ()),
+        swings_free=swings_free,
     )
     understood = read_files(files, options)
     for line in summary(understood):

@@ -115,15 +115,19 @@ class Column:
         return f"{quantity} is taken in {self.unit}, though its column says {stated}"
 
 
-def parse_map(specs: Sequence[str], *, described: bool = False) -> dict[str, Column]:
+def parse_map(
+    specs: Sequence[str], *, described: bool = False, swings_free: bool = False
+) -> dict[str, Column]:
     """Parse `quantity=[-]column[:unit]` for reference, torque, position, link and their stamps.
 
     Args:
         specs: one for each quantity.
         described: whether the controller is described, which then makes a torque that is missing.
+        swings_free: whether no torque acts, so that none is to be mapped.
 
     Raises:
-        InputError: a quantity or unit is unknown, named twice, or position or torque is missing.
+        InputError: a quantity or unit is unknown, named twice, or position or torque is missing; or
+            a torque is mapped where none acts.
     """
     columns: dict[str, Column] = {}
     for spec in specs:
@@ -140,14 +144,20 @@ def parse_map(specs: Sequence[str], *, described: bool = False) -> dict[str, Col
             )
         columns[quantity] = Column.parse(quantity, source)
     missing = [quantity for quantity in REQUIRED if quantity not in columns]
-    if missing == ["torque"] and described and "reference" in columns:
+    if swings_free and "torque" in columns:
+        raise InputError(
+            "the map has a torque, though no torque is said to act; leave out torque=..., or "
+            "--swings-free."
+        )
+    if missing == ["torque"] and (swings_free or (described and "reference" in columns)):
         missing = []
     if missing:
         made = ""
         if missing == ["torque"]:
             made = (
                 ", or, where reference and position were logged alone, describe the whole "
-                "controller that made it (--controller)"
+                "controller that made it (--controller), or, where no torque acts, say "
+                "--swings-free"
             )
         raise InputError(f"the map lacks {' and '.join(missing)}; add {missing[0]}=column{made}.")
     for quantity in columns:

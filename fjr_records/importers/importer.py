@@ -93,7 +93,7 @@ def _maker(
     path: Path, controller: dict[str, Any] | None, rate_hz: float, options: ImportOptions
 ) -> TransferFunction | None:
     """Return the law that makes a torque which was not recorded; None where it was."""
-    if "torque" in options.columns:
+    if "torque" in options.columns or options.swings_free:
         return None
     if controller is None or "unknown" in controller or "reference" not in options.columns:
         raise InputError(

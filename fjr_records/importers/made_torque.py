@@ -13,6 +13,7 @@ MADE = (
     "the torque was not recorded: it is what the described controller makes of reference and "
     "position, at rest before the first sample and with an integral of zero"
 )
+SWINGS_FREE = "no torque acts: the axis swings free"
 _REST_S = 1.0
 
 

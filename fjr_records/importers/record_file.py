@@ -17,7 +17,7 @@ from . import coherence, part
 from .columns import read_columns
 from .import_map import OWN_TIME, TIME, Column, is_time, refuse_both_axes
 from .integrals import DRIFTS, integrals
-from .made_torque import MADE, made_torque
+from .made_torque import MADE, SWINGS_FREE, made_torque
 from .own_stamps import own_stamps
 from .part import LEAST_SAMPLES
 from .repetition import Repetition, find_repetition, insists
@@ -45,6 +45,7 @@ class ImportOptions:
         levels: number of amplitudes; the files come level by level.
         repeat_reference: whether the reference is one period, played again and again.
         controllers: files that describe the controller: none, one for all, or one for each file.
+        swings_free: whether no torque acts, so that none is mapped.
     """
 
     columns: Mapping[str, Column]
@@ -58,6 +59,7 @@ class ImportOptions:
     levels: int = 1
     repeat_reference: bool = False
     controllers: tuple[Path, ...] = ()
+    swings_free: bool = False
 
 
 @dataclass(frozen=True)
@@ -218,6 +220,9 @@ def understand(
     if law is not None and "u" not in signals:
         signals["u"] = made_torque(law, signals["r"], signals["y"], rate_hz)
         notes += (MADE,)
+    if options.swings_free:
+        signals["u"] = np.zeros(signals["y"].size)
+        notes += (SWINGS_FREE,)
     if not np.ptp(signals["y"]) > 0:
         raise InputError(f"{path}: the position is constant; map the column that carries it.")
     found: Repetition | str = DRIFTS
@@ -227,7 +232,7 @@ def understand(
         raise InputError(f"{path}: {DRIFTS}; leave out what is said of its periods and lines.")
     repetition = found if isinstance(found, Repetition) else None
     doubts = samples.doubts + _unit_doubts(path, signals, repetition, columns)
-    if not np.ptp(signals["u"]) > 0:
+    if not (np.ptp(signals["u"]) > 0 or options.swings_free):
         doubts += ("the torque is constant, so no response can be told from this run",)
     brakes = wrong_sign(signals["u"], signals["y"])
     if brakes is not None:

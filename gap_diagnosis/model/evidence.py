@@ -163,6 +163,11 @@ class Evidence:
         return not any(np.any(record.torque) for record in self.records.records)
 
     @property
+    def unseen(self) -> tuple[str, ...]:
+        """Base parameters of which the records show nothing, so that the datasheet's count."""
+        return ("jm", "j") if self.slow else ("jm",) if self.swings_free else ()
+
+    @property
     def player(self) -> RecordSimulator:
         """What plays the runs; that of slow ones plays nothing."""
         assert isinstance(self.simulator, RecordSimulator)

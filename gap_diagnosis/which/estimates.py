@@ -56,6 +56,8 @@ def form(fit: CellFit, share: float) -> np.ndarray:
 def linear_estimates(fit: CellFit, std: np.ndarray) -> dict[str, Estimate]:
     """Return all free parameters of a fit with their 95 % intervals, cut at their bounds.
 
+    What is not free is known as far as the datasheet is.
+
     Args:
         fit: an explanation.
         std: (parameters,), standard deviations of its point.
@@ -68,6 +70,10 @@ def linear_estimates(fit: CellFit, std: np.ndarray) -> dict[str, Estimate]:
         name: Estimate(value=fit.model.plant[name], low=low.plant[name], high=high.plant[name])
         for name in space.nominal
     }
+    off = 1.0 + space.tolerance
+    for name in set(space.known) & set(found):
+        value = found[name].value
+        found[name] = Estimate(value=value, low=value / off, high=value * off)
     for name in space.effects:
         found[name] = Estimate(
             value=fit.model.effects[name], low=low.effects[name], high=high.effects[name]

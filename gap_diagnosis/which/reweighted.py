@@ -58,7 +58,7 @@ class ReweightedFits(Comparison):
 
     def refit(self) -> CellFit:
         """Fit the base parameters alone, from the datasheet."""
-        known = ("jm",) if self.evidence.swings_free else ()
+        known = self.evidence.unseen
         space = Space(self.nominal, (), (), self.tolerance, self.scales, known)
         first = self._begun((), space, space.point(Model(self.nominal, {})))
         left = first.solution.residuals / self.weights.weight(first.variance)

@@ -82,3 +82,19 @@ def test_position_and_torque_are_needed_without_a_reference():
         parse_map(["position=y"], described=True)
     with pytest.raises(InputError, match=r"lacks torque and position; add torque=column\."):
         parse_map(["reference=r"], described=True)
+
+
+def test_where_no_torque_acts_none_is_mapped(tmp_path):
+    stamps = np.arange(400) / 100.0
+    file = tmp_path / "let_go.csv"
+    angle = np.exp(-0.2 * stamps) * np.cos(5.0 * stamps)
+    np.savetxt(file, np.column_stack([stamps, angle]), delimiter=",", header="t,y", comments="")
+    columns = parse_map(["time=t", "position=y"], swings_free=True)
+    (record,) = read_files([file], ImportOptions(columns, swings_free=True)).records
+    assert not record.signals["u"].any() and record.signals["u"].size == 400
+    assert any("swings free" in note for note in record.notes)
+    assert not any("torque" in doubt for doubt in record.doubts)
+    with pytest.raises(InputError, match="say --swings-free"):
+        parse_map(["time=t", "position=y"])
+    with pytest.raises(InputError, match="no torque is said to act"):
+        parse_map(["torque=u", "position=y"], swings_free=True)
