@@ -134,5 +134,6 @@ def import_records(
         typer.echo("Nothing was written. Next: the same command with --out FOLDER, no --dry-run.")
         return
     write_bags(understood, out)
-    typer.echo(f"Next: fjr analyze {out}")
+    next_step = f"diagnose {out} --nominal DATASHEET" if swings_free else f"analyze {out}"
+    typer.echo(f"Next: fjr {next_step}")
     typer.echo(out)

@@ -82,7 +82,7 @@ def _file(record: Record, one: Experiment | RecordDescription) -> Iterator[str]:
             continue
         values, unit = record.signals[symbol], units[quantity]
         column = record.columns.get(quantity)
-        source = "made by the controller"
+        source = "made by the controller" if np.any(values) else "none acts"
         if column is not None:
             stated = f" in {column.unit} as the file says" if column.stated else ""
             source = f"{column.name}{stated}, times {column.factor:.6g}"

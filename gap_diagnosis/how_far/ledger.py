@@ -67,15 +67,19 @@ class Ledger:
         return np.bincount(part, squares) / windows
 
     def torque_squares(self, model: Model) -> np.ndarray:
-        """Return the squared error of the torque over its mean square of each part, (parts,)."""
+        """Return the squared error of the torque over its variance of each part, (parts,).
+
+        Over the mean variance of all runs where a drive was switched off or only holds.
+        """
         evidence = self.evidence
+        usual = np.mean([np.var(record.torque) for record in evidence.records.records])
         runs = dict(zip(self.runs, self._errors_and_runs(model)[1], strict=True))
         found = []
         for part in (evidence.parts[p] for p in self.parts):
             torque = evidence.records.records[part.record].torque
             at = slice(part.windows.start * evidence.hop, (part.windows.stop + 1) * evidence.hop)
             error = float(np.mean((runs[part.record][1][at] - torque[at]) ** 2))
-            found.append(error / max(float(np.var(torque)), 1e-300))
+            found.append(error / float(np.var(torque) or usual or 1.0))
         return np.array(found)
 
     def step(self, model: Model, added: str | None, stage: Stage) -> Step:
@@ -85,7 +89,9 @@ class Ledger:
         if evidence.noise.known:
             chi2 = float(np.mean(self._errors_and_runs(model)[0] ** 2 / self._floor))
         missed = float(np.sqrt(np.mean(self.squares(model))))
-        torque = float(np.sqrt(np.mean(self.torque_squares(model))))
+        torque = None
+        if not evidence.swings_free:
+            torque = float(np.sqrt(np.mean(self.torque_squares(model))))
         return Step(
             added=added,
             stage=stage,
@@ -106,12 +112,12 @@ class Ledger:
         squares = {stage: self.squares(model) for stage, model in stages.items()}
         if self.evidence.slow:
             return {"torque": stage_figures(squares, None, choice, closes)}
-        torque = {stage: self.torque_squares(model) for stage, model in stages.items()}
         noise = self._noise() if self.evidence.noise.known else None
-        return {
-            "position": stage_figures(squares, noise, choice, closes),
-            "torque": stage_figures(torque, None, choice, closes),
-        }
+        found = {"position": stage_figures(squares, noise, choice, closes)}
+        if not self.evidence.swings_free:
+            torque = {stage: self.torque_squares(model) for stage, model in stages.items()}
+            found["torque"] = stage_figures(torque, None, choice, closes)
+        return found
 
     def _noise(self) -> np.ndarray:
         """Return the squared position that noise alone leaves of each part, (parts,)."""

@@ -111,12 +111,12 @@ class GapFigures(ResultModel):
 
     Attributes:
         position: rms error over rms; None where torques were compared.
-        torque: rms error over rms.
+        torque: rms error over rms; None where no run has a torque.
         bla_sigma, distortion_db: of steady periods; None for records.
     """
 
     position: StageFigures | None = None
-    torque: StageFigures
+    torque: StageFigures | None = None
     bla_sigma: StageFigures | None = None
     distortion_db: StageFigures | None = None
 

@@ -98,7 +98,7 @@ def judge(
     verdict = verdict_of(causes, steps, evidence, thin)
     models = {"nominal": nominal, "refit": refit.model, "explained": best.model}
     figures = GapFigures(**ledger.figures(models, closes=bool(causes)))
-    main = figures.torque if figures.position is None else figures.position
+    main = figures.position or figures.torque
     return Diagnosis(
         verdict=verdict,
         effects=[cause.effect for cause in causes],
@@ -115,7 +115,7 @@ def judge(
         steps=steps,
         remainder=ledger.remainder(best.model, refit.model),
         gap=gaps_of(steps, ledger.noise()),
-        gap_closed=None if main.closed is None else main.closed.value,
+        gap_closed=None if main is None or main.closed is None else main.closed.value,
         gap_figures=figures,
         where=ledger.places_of_error(refit.model),
         bags=bags,
