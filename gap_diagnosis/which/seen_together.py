@@ -29,7 +29,6 @@ _FALLEN = (0.01, 0.02, 0.04, 0.08, 0.16, 0.32)
 """Of the usual speed: where friction may have fallen from breakaway."""
 _OF_LOAD = "load_friction.coefficient"
 _SLIGHT = 1e-6  # of the squares of the torque: less of it says nothing
-_SAME = 1e-3  # relative: squares that differ by less are the same
 _NO_WORSE, _NEARLY_AS_WELL = 1.05, 1.3
 """Squares that are left over those of the best: a friction that explains no more is not needed; a
 load that leaves no more does as well, and what falls from breakaway must leave so much less."""
@@ -130,8 +129,8 @@ class Seen:
     ) -> list[str]:
         """Return the laws, and that of friction under load, without which more is left.
 
-        What is needed least goes first, of two that do the same the law under load: beside a
-        constant load it is Coulomb friction.
+        Of several that are not needed the rarest goes first: a drag that grows with the square of
+        speed before viscous friction, friction under a constant load before Coulomb friction.
         """
         needed = list(laws)
         if load and _effect(_OF_LOAD) in effects:
@@ -142,12 +141,11 @@ class Seen:
 
         least = _NO_WORSE * left(needed)
         while needed:
-            fewer = [[o for o in needed if o != name] for name in reversed(needed)]
-            lefts = [left(names) for names in fewer]
-            if min(lefts) > least:
+            fewer = ([o for o in needed if o != name] for name in reversed(needed))
+            rest = next((names for names in fewer if left(names) <= least), None)
+            if rest is None:
                 break
-            as_well = (1.0 + _SAME) * min(lefts)
-            needed = next(n for n, each in zip(fewer, lefts, strict=True) if each <= as_well)
+            needed = rest
         return needed
 
     def _regressed(
