@@ -241,12 +241,16 @@ class Extension:
     def _one_cause(self, parent: CellFit, steps: Sequence[CellFit]) -> list[str]:
         """Return what could only name a cause of the parent twice; see `ONE_CAUSE`.
 
-        A cause that was added to others had but what these left to close.
+        A cause that was added to others had but what these left to close; of one that came
+        together with what the datasheet lacks it is not known what it closed.
         """
         named = []
         for effect in parent.effects:
             before = next(fit for fit in reversed(steps) if effect not in fit.effects)
-            if self._closes_nearly_all(parent, before):
+            came = next((fit for fit in steps if effect in fit.effects), parent)
+            with_it = {*came.effects} - {*before.effects, effect}
+            lacked = any(fx.EFFECTS[e].of_bare_plant for e in with_it)
+            if not lacked and self._closes_nearly_all(parent, before):
                 named.append(effect)
         return partners(named, set(self.effects), self._fitter.nominal)
 
