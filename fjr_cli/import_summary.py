@@ -12,6 +12,7 @@ from fjr_interface.experiment import Experiment, RecordDescription
 from fjr_records.importers.columns import Held, held_columns
 from fjr_records.importers.importer import Understood
 from fjr_records.importers.likely_columns import likely_map
+from fjr_records.importers.made_torque import SWINGS_FREE
 from fjr_records.importers.part import LEAST_SAMPLES
 from fjr_records.importers.record_file import SYMBOLS, Record
 from fjr_records.importers.repetition import Repetition
@@ -82,7 +83,7 @@ def _file(record: Record, one: Experiment | RecordDescription) -> Iterator[str]:
             continue
         values, unit = record.signals[symbol], units[quantity]
         column = record.columns.get(quantity)
-        source = "made by the controller" if np.any(values) else "none acts"
+        source = "none acts" if SWINGS_FREE in record.notes else "made by the controller"
         if column is not None:
             stated = f" in {column.unit} as the file says" if column.stated else ""
             source = f"{column.name}{stated}, times {column.factor:.6g}"

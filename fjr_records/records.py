@@ -84,6 +84,11 @@ class RecordSet:
         return tuple(sorted({record.level for record in self.records}))
 
     @cached_property
+    def swings_free(self) -> bool:
+        """Whether no run has a torque: then sizes show only as ratios to the inertia."""
+        return not any(np.any(record.torque) for record in self.records)
+
+    @cached_property
     def repeats(self) -> tuple[tuple[int, ...], ...]:
         """Groups of indices of records that repeat each other, each index in one group.
 

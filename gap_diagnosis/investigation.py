@@ -162,8 +162,9 @@ def investigate_runs(
     )  # fmt: skip
     model = Model.nominal(nominal)
     linear_axis = any(record.description.linear for record in records.records)
-    swings_free = not any(np.any(record.torque) for record in records.records)
-    names = catalogue(model.plant, order.effects, linear_axis=linear_axis, swings_free=swings_free)
+    names = catalogue(
+        model.plant, order.effects, linear_axis=linear_axis, swings_free=records.swings_free
+    )
     if order.drift and order.effects is None:
         names.append(DRIFT)
     if slow is None:
@@ -273,7 +274,7 @@ def _notes(evidence: Evidence, found: Found) -> list[str]:
     if not loop.commanded:  # a controller that makes the torque has its sign
         doubted = [(r.name, wrong_sign(r.torque, r.position)) for r in evidence.records.records]
         notes += [f"{name}: {doubt}." for name, doubt in doubted if doubt is not None][:_SHOWN]
-    if evidence.swings_free:
+    if evidence.records.swings_free:
         notes.append(SWINGS_FREE)
     step = evidence.noise.step_rad
     if step is not None and evidence.noise.std_rad <= 1.01 * step / math.sqrt(12.0):

@@ -62,6 +62,11 @@ def read_files(files: Sequence[str | Path], options: ImportOptions) -> Understoo
             f"{len(options.controllers)} controllers are given for {len(files)} files; give one "
             "for all, or one for each file in their order."
         )
+    if options.swings_free and options.controllers:
+        raise InputError(
+            f"{options.controllers[0]}: no controller makes a torque where none acts; leave out "
+            "--controller, or --swings-free."
+        )
     laws = [controller_file.read_controller(path) for path in options.controllers]
     samples = [read_samples(Path(file), options) for file in files]
     common = _grid_rate(samples)

@@ -90,7 +90,7 @@ class Ledger:
             chi2 = float(np.mean(self._errors_and_runs(model)[0] ** 2 / self._floor))
         missed = float(np.sqrt(np.mean(self.squares(model))))
         torque = None
-        if not evidence.swings_free:
+        if not evidence.records.swings_free:
             torque = float(np.sqrt(np.mean(self.torque_squares(model))))
         return Step(
             added=added,
@@ -114,7 +114,7 @@ class Ledger:
             return {"torque": stage_figures(squares, None, choice, closes)}
         noise = self._noise() if self.evidence.noise.known else None
         found = {"position": stage_figures(squares, noise, choice, closes)}
-        if not self.evidence.swings_free:
+        if not self.evidence.records.swings_free:
             torque = {stage: self.torque_squares(model) for stage, model in stages.items()}
             found["torque"] = stage_figures(torque, None, choice, closes)
         return found

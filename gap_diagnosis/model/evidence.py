@@ -158,14 +158,9 @@ class Evidence:
         return np.add.reduceat(squares, self.edges[:-1]) / np.diff(self.edges)
 
     @property
-    def swings_free(self) -> bool:
-        """Whether no run has a torque: then sizes show only as ratios to the inertia."""
-        return not any(np.any(record.torque) for record in self.records.records)
-
-    @property
     def unseen(self) -> tuple[str, ...]:
         """Base parameters of which the records show nothing, so that the datasheet's count."""
-        return ("jm", "j") if self.slow else ("jm",) if self.swings_free else ()
+        return ("jm", "j") if self.slow else ("jm",) if self.records.swings_free else ()
 
     @property
     def player(self) -> RecordSimulator:

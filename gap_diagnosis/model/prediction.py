@@ -169,10 +169,7 @@ def prediction_error(
         (1 + G L)^-1 (y - G u), (..., N) in rad.
     """
     samples = position.shape[-1]
-    frequency = np.fft.rfftfreq(samples, 1.0 / sample_rate_hz)
-    frequency[0] = _NEARLY_ZERO * frequency[1]  # a free axis has no gain at zero
-    plant = linear.g0(nominal, frequency, sample_rate_hz)
-    loop = plant * observer.response(frequency, sample_rate_hz)[1]
+    plant, loop = _at_lines(samples, nominal, observer, sample_rate_hz)
     error = (np.fft.rfft(position) - plant * np.fft.rfft(torque)) / (1.0 + loop)
     return np.fft.irfft(error, samples)
 
@@ -196,11 +193,18 @@ def added_for(
         less above.
     """
     samples = next_fast_len(2 * torque.size, real=True)
+    _, loop = _at_lines(samples, nominal, observer, sample_rate_hz)
+    return np.fft.irfft(np.fft.rfft(torque, samples) * loop / (1.0 + loop), samples)[: torque.size]
+
+
+def _at_lines(
+    samples: int, nominal: Mapping[str, float], observer: TransferFunction, sample_rate_hz: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return G and G L at the lines of so many samples, (lines,)."""
     frequency = np.fft.rfftfreq(samples, 1.0 / sample_rate_hz)
     frequency[0] = _NEARLY_ZERO * frequency[1]  # a free axis has no gain at zero
     plant = linear.g0(nominal, frequency, sample_rate_hz)
-    loop = plant * observer.response(frequency, sample_rate_hz)[1]
-    return np.fft.irfft(np.fft.rfft(torque, samples) * loop / (1.0 + loop), samples)[: torque.size]
+    return plant, plant * observer.response(frequency, sample_rate_hz)[1]
 
 
 def loses(recorded: RecordedExperiment) -> str:

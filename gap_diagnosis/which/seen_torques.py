@@ -52,7 +52,7 @@ class SeenTorques:
         every = max(int(rate / (_PER_CROSSOVER * simulator.crossover_hz)), 1)
         runs = sorted({evidence.parts[p].record for p in parts})
         self._simulator, self._every = simulator, every
-        self._swings_free = evidence.swings_free
+        self._swings_free = evidence.records.swings_free
         self._ends = np.cumsum([records[index].samples for index in runs])[:-1]
         self._places, columns, motions = [], [], []
         for index, missing in zip(runs, simulator.missing_torque(model, runs), strict=True):

@@ -96,5 +96,7 @@ def test_where_no_torque_acts_none_is_mapped(tmp_path):
     assert not any("torque" in doubt for doubt in record.doubts)
     with pytest.raises(InputError, match="say --swings-free"):
         parse_map(["time=t", "position=y"])
+    with pytest.raises(InputError, match="no controller makes a torque where none acts"):
+        read_files([file], ImportOptions(columns, swings_free=True, controllers=(file,)))
     with pytest.raises(InputError, match="no torque is said to act"):
         parse_map(["torque=u", "position=y"], swings_free=True)

@@ -130,3 +130,17 @@ def test_where_the_refit_misses_far_more_than_the_motion_nothing_is_searched():
     tried = investigate_runs(records(), Order(absurd))
     assert LOST in tried.diagnosis.notes and tried.diagnosis.verdict == "unexplained"
     assert len(tried.fitted.found.steps) == 1 and not tried.fitted.found.rivals
+
+
+def test_what_came_with_lacking_friction_does_not_keep_its_near_equivalents_out():
+    """Of causes that came at once it is not known which closed what, so cogging may still come."""
+    fitter = CellFitter(Evidence(records(seconds=4.0), BARE), BARE, 0.1)
+    refit = fitter.refit()
+    extension = Extension(fitter, ("coulomb_friction", "torque_bias", "cogging"), lambda _: None)
+    friction = replace(refit, effects=("coulomb_friction",), left=0.5 * refit.left)
+    both = replace(refit, effects=("coulomb_friction", "torque_bias"), left=1e-4 * refit.left)
+    assert fitter.misfit(both) < 0.01 * fitter.misfit(friction)
+    assert "cogging" in extension._one_cause(both, [refit, friction])
+    assert "cogging" in extension._one_cause(both, [refit, friction, both])
+    assert "cogging" not in extension._one_cause(both, [refit])
+    assert "cogging" not in extension._one_cause(both, [refit, both])
