@@ -11,10 +11,15 @@ The file is YAML or JSON. Its `kind` names the structure; every gain is a number
                                     u = C_r r - C_y y
     kind: pd_filtered               p, d, n: the law of the controller node
 
+Any kind may have `rate_hz`, the rate at which the law runs where its record is sampled more slowly;
+`between_samples` then says whether a sample of the reference is `held` until the next (a command
+that is logged when it is sent) or both are `joined` by a straight line.
+
 Transfer functions are `domain: discrete` (powers z^0, z^-1, ...) or `continuous` (descending powers
 of s, made discrete by Tustin's rule); of their coefficients those of a numerator may be unknown.
-Integrals are sums, (Ts/(1 - z^-1)); a derivative is a difference, or the step-invariant one of
-`pd_filtered` where it has a filter. Any kind may have `torque_limit_nm`, and `feed_forward` with
+Integrals are sums, (Ts/(1 - z^-1)); a derivative is a difference, (1 - z^-1)/Ts, with the low-pass
+(1 - a)/(1 - a z^-1), a = exp(-n Ts), where it has a filter; that of `pd_filtered` alone is the
+step-invariant one. Any kind may have `torque_limit_nm`, and `feed_forward` with
 `velocity` (N m s/rad) and `acceleration` (N m s^2/rad). The torque is clamped to its limit, an
 integral is not: there is no anti-windup.
 """
@@ -71,7 +76,7 @@ def describe(structure: AnyStructure, sample_rate_hz: float, source: str) -> dic
     law = structure.law(sample_rate_hz, f"{source}: controller")
     limit = structure.torque_limit_nm
     clamp = {"torque_limit_nm": None if limit is None else float(limit)}
-    if isinstance(structure, NodeLaw) and structure.feed_forward == FeedForward():
+    if isinstance(structure, NodeLaw) and not _more(structure):
         gains = {"p": structure.p, "d": structure.d, "n": structure.n}
         return {"kind": structure.kind, **gains, **clamp}
     reference, position, denominator = (
@@ -87,6 +92,11 @@ def describe(structure: AnyStructure, sample_rate_hz: float, source: str) -> dic
         **clamp,
         "given": given,
     }
+
+
+def _more(structure: NodeLaw) -> bool:
+    """Tell whether a law of the controller node has what the node itself has not."""
+    return structure.feed_forward != FeedForward() or structure.rate_hz is not None
 
 
 def _unknown(given: Any, prefix: str = "") -> list[str]:

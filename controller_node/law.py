@@ -43,6 +43,28 @@ def law_of(
     return structure_of(known_fields(controller), SOURCE).law(sample_rate_hz, SOURCE)
 
 
+def law_as_run(
+    controller: Mapping[str, Any] | None,
+    sample_rate_hz: float,
+    gains: Mapping[str, float] | None = None,
+) -> TransferFunction:
+    """Return the law as it ran: several times in one sample where a description says so.
+
+    Args:
+        controller: as of `law_of`.
+        sample_rate_hz: rate of the experiment.
+        gains: as of `law_of`.
+
+    Raises:
+        InputError: as `law_of`.
+    """
+    filled = with_gains(controller or {}, gains or {})
+    whole = {**filled, **(filled.get("given") or {})} if "given" in filled else filled
+    if not whole.get("rate_hz"):
+        return as_transfer_function(law_of(filled, sample_rate_hz))
+    return structure_of(known_fields(whole), SOURCE).law_as_run(sample_rate_hz, SOURCE)
+
+
 def as_transfer_function(law: Law) -> TransferFunction:
     """Return any law as a transfer function."""
     return law if isinstance(law, TransferFunction) else TransferFunction.of_pd(law)

@@ -89,9 +89,21 @@ def _divided(dividend: np.ndarray, divisor: np.ndarray) -> np.ndarray | None:
 
 
 def derivative(filter_rad_s: float | None, period_s: float) -> Ratio:
-    """Return d/dt, behind a filter step-invariant as in `pd_filtered`, else a difference."""
+    """Return d/dt: the difference of two samples over their time, which a low-pass then smooths.
+
+    A steady speed comes out as it is, however slow the filter is over a sample.
+    """
     if filter_rad_s is None:
         return np.array([1.0, -1.0]) / period_s, np.array([1.0])
+    decay = math.exp(-filter_rad_s * period_s)
+    return (1.0 - decay) / period_s * np.array([1.0, -1.0]), np.array([1.0, -decay])
+
+
+def step_invariant_derivative(filter_rad_s: float, period_s: float) -> Ratio:
+    """Return d/dt behind a low-pass as `pd_filtered` has it, right after a step of its input.
+
+    A steady speed comes out as n Ts/(1 - exp(-n Ts)) of itself.
+    """
     decay = math.exp(-filter_rad_s * period_s)
     return filter_rad_s * np.array([1.0, -1.0]), np.array([1.0, -decay])
 

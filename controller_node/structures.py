@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -24,6 +25,9 @@ from .transfer_function import TransferFunction
 UNKNOWN = "unknown"
 ONE_DEGREE, TWO_DEGREES = "transfer_function", "two_degrees_of_freedom"
 _MOST_COEFFICIENTS = 128
+FASTEST_HZ = 1e5
+"""Highest rate of a law."""
+_SAME_RATE = 1e-3
 
 
 def _no_truth(value: Any) -> Any:
@@ -78,6 +82,8 @@ class Structure(_Part):
 
     torque_limit_nm: Rate | None = None
     feed_forward: FeedForward = FeedForward()
+    rate_hz: Annotated[float, Field(gt=0, le=FASTEST_HZ), BeforeValidator(_known)] | None = None
+    between_samples: Literal["held", "joined"] = "held"
 
     @abstractmethod
     def ratios(self, period_s: float) -> tuple[Ratio, Ratio]:
@@ -101,6 +107,26 @@ class Structure(_Part):
         if law.denominator.size > _MOST_COEFFICIENTS:
             raise InputError(f"{source} has more than {_MOST_COEFFICIENTS} coefficients.")
         return law.checked(source)
+
+    def law_as_run(self, sample_rate_hz: float, source: str) -> TransferFunction:
+        """Return the law at its own rate, the multiple of a slower one that comes nearest to it.
+
+        Raises:
+            InputError: as `law` and `steps`; names `source`.
+        """
+        steps = self.steps(sample_rate_hz, source)
+        law = self.law(steps * sample_rate_hz, source)
+        return replace(law, steps=steps, joins=self.between_samples == "joined")
+
+    def steps(self, sample_rate_hz: float, source: str) -> int:
+        """Return how often the law runs in one sample; raise InputError if it runs slower."""
+        rate_hz = sample_rate_hz if self.rate_hz is None else self.rate_hz
+        if rate_hz < sample_rate_hz * (1.0 - _SAME_RATE):
+            raise InputError(
+                f"{source}.rate_hz is {rate_hz:g} Hz, but the samples come at {sample_rate_hz:g} "
+                "Hz; a law that runs slower than its record cannot be played."
+            )
+        return round(rate_hz / sample_rate_hz)
 
 
 def _causal(ratio: Ratio, source: str) -> Ratio:
@@ -212,7 +238,7 @@ class NodeLaw(Structure):
 
     def ratios(self, period_s: float) -> tuple[Ratio, Ratio]:
         """Return (C_r, C_y)."""
-        filtered = polynomials.derivative(float(self.n), period_s)
+        filtered = polynomials.step_invariant_derivative(float(self.n), period_s)
         law = polynomials.total(
             polynomials.scaled(float(self.p), ONE), polynomials.scaled(float(self.d), filtered)
         )

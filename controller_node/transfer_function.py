@@ -6,6 +6,11 @@ with b and a in powers z^0, z^-1, ... at the rate of the experiment, r and y in 
 law from r - y to u has b_r = b_y; a feed-forward of r is in b_r. There is one denominator and one
 state, so that an integrator integrates r - y and not each of both. The torque is clamped to its
 limit, the state is not: there is no anti-windup.
+
+A law may run several times in one sample of a record, as that of a drive whose log is slow. Then
+its powers are those of its own steps. Signals are given at the samples; between them the reference
+is held or joined by a straight line, and a recorded position goes on as a cubic spline. The torque
+of a sample is the mean until the next.
 """
 
 from __future__ import annotations
@@ -17,6 +22,7 @@ from functools import cached_property
 
 import numpy as np
 import scipy
+from scipy.interpolate import CubicSpline
 
 from fjr_kit.compiled import inlined
 from fjr_kit.errors import InputError
@@ -35,12 +41,16 @@ class TransferFunction:
         position: numerator of C_y, of the same length.
         denominator: 1, a1...an of both, of the same length.
         limit_nm: the torque is clamped to +- this.
+        steps: how often the law runs in one sample of a record.
+        joins: whether a straight line joins two samples of the reference; else each is held.
     """
 
     reference: np.ndarray
     position: np.ndarray
     denominator: np.ndarray
     limit_nm: float = math.inf
+    steps: int = 1
+    joins: bool = False
 
     @classmethod
     def of(
@@ -113,7 +123,8 @@ class TransferFunction:
         self, frequency_hz: np.ndarray, sample_rate_hz: float
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return C_r and C_y, complex of the shape of `frequency_hz`, N m/rad."""
-        delay = np.exp(-2j * np.pi * np.asarray(frequency_hz, float) / sample_rate_hz)
+        own_rate_hz = self.steps * sample_rate_hz
+        delay = np.exp(-2j * np.pi * np.asarray(frequency_hz, float) / own_rate_hz)
         parts = (self.reference, self.position, self.denominator)
         r, y, a = (np.polynomial.polynomial.polyval(delay, part) for part in parts)
         with np.errstate(divide="ignore", invalid="ignore"):  # an integrator at frequency zero
@@ -132,6 +143,17 @@ class TransferFunction:
         Raises:
             InputError: r and y differ in length.
         """
+        return self._mean(self._at_steps(reference, position, state))
+
+    def torque(
+        self, reference: np.ndarray, position: np.ndarray, state: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Return the torque of recorded signals within the limit; arguments as of `unlimited`."""
+        return self._mean(self.clamped(self._at_steps(reference, position, state)))
+
+    def _at_steps(
+        self, reference: np.ndarray, position: np.ndarray, state: np.ndarray | None
+    ) -> np.ndarray:
         if reference.shape != position.shape:
             raise InputError(
                 f"The reference has {reference.size} samples and the position {position.size}; "
@@ -139,8 +161,32 @@ class TransferFunction:
             )
         b, forward, a, _ = self.coefficients
         zi = np.zeros(self.states) if state is None else state
+        reference, position = self.between(reference), self._going_on(position)
         torque = scipy.signal.lfilter(b, a, reference - position, zi=zi)[0]
         return torque + scipy.signal.lfilter(forward, a, reference) if forward.any() else torque
+
+    def _mean(self, signal: np.ndarray) -> np.ndarray:
+        """Return the mean of a signal over the steps of each sample, along the last axis."""
+        if self.steps == 1:
+            return signal
+        return signal.reshape(*signal.shape[:-1], -1, self.steps).mean(axis=-1)
+
+    def between(self, reference: np.ndarray) -> np.ndarray:
+        """Return a sampled reference at each step of the law, (steps x samples,)."""
+        if self.steps == 1:
+            return reference
+        if not self.joins:
+            return np.repeat(reference, self.steps)
+        at = np.arange(self.steps * reference.size) / self.steps
+        return np.interp(at, np.arange(reference.size), reference)
+
+    def _going_on(self, position: np.ndarray) -> np.ndarray:
+        """Return a recorded position at each step of the law, (steps x samples,)."""
+        if self.steps == 1:
+            return position
+        at = np.arange(self.steps * position.size) / self.steps
+        samples = np.arange(position.size)
+        return CubicSpline(samples, position)(np.minimum(at, samples[-1]))
 
     def clamped(self, torque: np.ndarray) -> np.ndarray:
         """Return a torque within the limit."""
@@ -171,10 +217,10 @@ class TransferFunction:
 
     def free_responses(self, samples: int) -> np.ndarray:
         """Return the torque that follows from each element of the state alone, (samples, n)."""
-        nothing, one = np.zeros(samples), np.ones(1)
+        nothing, one = np.zeros(self.steps * samples), np.ones(1)
         filtered = scipy.signal.lfilter
         columns = [filtered(one, self.denominator, nothing, zi=x)[0] for x in np.eye(self.states)]
-        return np.reshape(columns, (self.states, samples)).T
+        return self._mean(np.reshape(columns, (self.states, nothing.size))).T
 
 
 @inlined

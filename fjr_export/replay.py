@@ -96,6 +96,8 @@ def runs_of(joint: Joint, records: RecordSet) -> list[Run]:
     runs = []
     for index in held or range(len(records.records)):
         drive = evidence.player.drive(index)
+        if drive.law.steps > 1:  # a target takes one torque in each sample
+            drive = evidence.player.observed(index)
         if isinstance(records.records[index].description, Experiment) and not drive.observed:
             drive = replace(drive, start=(0.0, 0.0), entry=None)  # periods begin at rest
         try:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from controller_node import controller_file
-from controller_node.law import as_transfer_function, law_of
+from controller_node.law import law_as_run
 from controller_node.transfer_function import TransferFunction
 from fjr_interface.bags.folder_names import bag_folder
 from fjr_interface.bags.writer import BagWriter
@@ -73,11 +73,13 @@ def read_files(files: Sequence[str | Path], options: ImportOptions) -> Understoo
     rates = [common or each.timing.rate_hz for each in samples]
     sources = [str(path) for path in options.controllers] * (1 if len(laws) > 1 else len(samples))
     controllers: list[dict[str, Any] | None] = [None] * len(samples)
+    faster = False
     for number, source in enumerate(sources):
         structure = laws[number if len(laws) > 1 else 0]
+        faster |= structure.steps(rates[number], f"{source}: controller") > 1
         controllers[number] = controller_file.describe(structure, rates[number], source)
     records = [
-        understand(each, rate, options, _maker(each.path, controller, rate, options))
+        understand(each, rate, options, _maker(each.path, controller, rate, options), faster)
         for each, rate, controller in zip(samples, rates, controllers, strict=True)
     ]
     for record, controller, source in zip(records, controllers, sources, strict=False):
@@ -105,7 +107,7 @@ def _maker(
             f"{path}: no torque is mapped, and only a reference and a controller that is described "
             "in all its gains could make it; map the torque, or describe the controller."
         )
-    return as_transfer_function(law_of(controller, rate_hz))
+    return law_as_run(controller, rate_hz)
 
 
 def _check_controller(record: Record, controller: dict[str, Any], source: str) -> None:
@@ -113,9 +115,9 @@ def _check_controller(record: Record, controller: dict[str, Any], source: str) -
     if "r" not in record.signals or "unknown" in controller:
         return
     r, u, y = (record.signals[symbol] for symbol in "ruy")
-    law = as_transfer_function(law_of(controller, record.sample_rate_hz))
+    law = law_as_run(controller, record.sample_rate_hz)
     with np.errstate(all="ignore"):
-        expected = law.clamped(law.unlimited(r, y))
+        expected = law.torque(r, y)
     settled = slice(int(_SETTLE * u.size), None)
     scale = float(np.std(u[settled]))
     with np.errstate(all="ignore"):

@@ -13,6 +13,7 @@ MADE = (
     "the torque was not recorded: it is what the described controller makes of reference and "
     "position, at rest before the first sample and with an integral of zero"
 )
+ONCE = "; the law runs once in each sample, unless its file says by rate_hz how fast it ran"
 SWINGS_FREE = "no torque acts: the axis swings free"
 _REST_S = 1.0
 
@@ -30,7 +31,7 @@ def made_torque(
     """
     rest = int(_REST_S * rate_hz) if not integrates(law) else 1
     r, y = (np.concatenate([np.full(rest, x[0]), x]) for x in (reference, position))
-    return law.clamped(law.unlimited(r, y))[rest:]
+    return law.torque(r, y)[rest:]
 
 
 def integrates(law: TransferFunction) -> bool:

@@ -17,7 +17,7 @@ from . import coherence, part
 from .columns import read_columns
 from .import_map import OWN_TIME, TIME, Column, is_time, refuse_both_axes
 from .integrals import DRIFTS, integrals
-from .made_torque import MADE, SWINGS_FREE, made_torque
+from .made_torque import MADE, ONCE, SWINGS_FREE, made_torque
 from .own_stamps import own_stamps
 from .part import LEAST_SAMPLES
 from .repetition import Repetition, find_repetition, insists
@@ -26,6 +26,7 @@ from .timing import Timing, of_one_clock, of_own_clocks, resample
 from .wraps import without_wraps
 
 SYMBOLS = {"reference": "r", "torque": "u", "position": "y", "link": "q"}
+FASTER = "its controller runs faster than it is sampled, so it is taken as no periodic run"
 _HALF = 2**15
 
 
@@ -199,7 +200,11 @@ def _lost_sign(column: np.ndarray) -> bool:
 
 
 def understand(
-    samples: Samples, rate_hz: float, options: ImportOptions, law: TransferFunction | None = None
+    samples: Samples,
+    rate_hz: float,
+    options: ImportOptions,
+    law: TransferFunction | None = None,
+    faster: bool = False,
 ) -> Record:
     """Bring a file onto the grid and find its period; raise InputError where it cannot be right.
 
@@ -208,6 +213,7 @@ def understand(
         rate_hz: of the grid.
         options: how to understand them.
         law: what makes a torque that was not recorded.
+        faster: whether the controller runs faster than the record is sampled.
     """
     path, columns, timing, values = samples.path, samples.columns, samples.timing, samples.values
     notes = (*samples.notes, *timing.notes)
@@ -219,17 +225,20 @@ def understand(
     signals = {SYMBOLS[quantity]: each for quantity, each in values.items()}
     if law is not None and "u" not in signals:
         signals["u"] = made_torque(law, signals["r"], signals["y"], rate_hz)
-        notes += (MADE,)
+        notes += (MADE if law.steps > 1 else MADE + ONCE,)
     if options.swings_free:
         signals["u"] = np.zeros(signals["y"].size)
         notes += (SWINGS_FREE,)
     if not np.ptp(signals["y"]) > 0:
         raise InputError(f"{path}: the position is constant; map the column that carries it.")
-    found: Repetition | str = DRIFTS
-    if not columns["position"].is_speed:
+    found: Repetition | str
+    cannot = DRIFTS if columns["position"].is_speed else FASTER if faster else None
+    if cannot is None:
         found = find_repetition(str(path), signals, rate_hz, options)
     elif insists(options):
-        raise InputError(f"{path}: {DRIFTS}; leave out what is said of its periods and lines.")
+        raise InputError(f"{path}: {cannot}; leave out what is said of its periods and lines.")
+    else:
+        found = cannot
     repetition = found if isinstance(found, Repetition) else None
     doubts = samples.doubts + _unit_doubts(path, signals, repetition, columns)
     if not (np.ptp(signals["u"]) > 0 or options.swings_free):

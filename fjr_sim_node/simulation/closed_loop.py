@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -77,6 +77,14 @@ class Trajectory:
     link: np.ndarray
     motor: np.ndarray
     end: State
+
+    def sampled(self, steps: int) -> Trajectory:
+        """Return the signals at every so many steps, the torque being its mean until the next."""
+        if steps == 1:
+            return self
+        names = ("reference", "position", "link", "motor")
+        signals = {name: getattr(self, name)[::steps] for name in names}
+        return replace(self, **signals, torque=self.torque.reshape(-1, steps).mean(axis=1))
 
     def recorded(self, signals: Sequence[Signal]) -> dict[str, np.ndarray]:
         """Return the samples of signals by their symbols, as a bag takes them."""
@@ -185,7 +193,7 @@ def simulate_law(
         reference: r, float64 of shape (samples,) in rad.
         sample_rate_hz: rate of the samples.
         plant_coefficients: from `plant.coefficients`.
-        controller: the law.
+        controller: the law; one that runs several times in a sample does so here.
         noise: encoder noise in rad, of shape (samples,); None for none.
         effects: from `effects.coefficients`; None for the bare plant.
         elapsed_s: time since the rig was switched on, for what drifts.
@@ -212,18 +220,25 @@ def simulate_law(
             begin.law[:-1] = _of_length(
                 controller_state, controller.states, "controller_state", "states"
             )
-    reference, noise, out = _prepared(reference, noise, begin)
+    steps, samples = controller.steps, np.size(reference)
+
+    def held(values: np.ndarray, name: str) -> np.ndarray:
+        return np.repeat(_of_length(values, samples, name, "samples"), steps)
+
+    if noise is not None:
+        noise = held(noise, "noise")
     beside = _NOTHING
     if command is not None:
-        beside = _of_length(command, reference.size, "command", "samples")
+        beside = held(command, "command")
     elif added is not None:
-        beside = _of_length(added, reference.size, "added", "samples")
+        beside = held(added, "added")
+    reference, noise, out = _prepared(controller.between(reference), noise, begin)
     _run_law(
         reference,
         beside,
         command is not None,
         noise,
-        1.0 / sample_rate_hz,
+        1.0 / (steps * sample_rate_hz),
         substeps,
         plant_coefficients,
         effects,
@@ -235,7 +250,7 @@ def simulate_law(
         out.link,
         out.motor,
     )
-    return _finite(out, sample_rate_hz)
+    return _finite(out, steps * sample_rate_hz).sampled(steps)
 
 
 def _prepared(

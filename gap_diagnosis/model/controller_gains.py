@@ -19,7 +19,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from controller_node.gains import FreeGain, free_gains
-from controller_node.law import as_transfer_function, law_of
+from controller_node.law import law_as_run
 from controller_node.transfer_function import TransferFunction
 from fjr_kit.errors import InputError
 
@@ -120,7 +120,7 @@ class _Record:
     def law(self, gains: Mapping[str, float]) -> TransferFunction:
         """Return the law with these gains and any limit."""
         missing = {_LIMIT: math.inf} if _LIMIT in self.controller["unknown"] else {}
-        return as_transfer_function(law_of(self.controller, self.rate, {**gains, **missing}))
+        return law_as_run(self.controller, self.rate, {**gains, **missing})
 
     def torque(self, law: TransferFunction) -> np.ndarray:
         """Return the torque of a law from zero state where the record's is free, (F,)."""

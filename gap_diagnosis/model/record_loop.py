@@ -16,7 +16,7 @@ import numpy as np
 from scipy.signal import csd, welch
 
 from controller_node.gains import unknown_gains
-from controller_node.law import as_transfer_function, law_of
+from controller_node.law import law_as_run
 from controller_node.transfer_function import TransferFunction
 from fjr_records.records import Record, RecordSet
 
@@ -212,7 +212,7 @@ def _unknown_in(loop: RecordLoop, out: Sequence[bool], note: str) -> RecordLoop:
 
 def _law(record: Record, rate: float, gains: Mapping[str, float]) -> TransferFunction:
     own = {name: gains[name] for name in unknown_gains(record.controller)}
-    return as_transfer_function(law_of(record.controller, rate, own))
+    return law_as_run(record.controller, rate, own)
 
 
 def _gains_told(gains: Mapping[str, Mapping[str, float]]) -> list[str]:
@@ -251,8 +251,7 @@ def not_made(law: TransferFunction, record: Record) -> np.ndarray:
     """Return the recorded torque less the one that a law makes of r and y, (samples,) in N m."""
     assert record.reference is not None
     state = law.entering_state(record.reference, record.position, record.torque)
-    made = law.unlimited(record.reference, record.position, state)
-    return record.torque - np.clip(made, -law.limit_nm, law.limit_nm)
+    return record.torque - law.torque(record.reference, record.position, state)
 
 
 def _solved(runs: Sequence[Record], rate: float) -> dict[str, float]:

@@ -213,13 +213,17 @@ class RecordSimulator:
         """Return what drives a simulation of one run."""
         law, record = self.loop.laws[index], self.records.records[index]
         if law is None:
-            observed = self._observed(index)
-            return replace(observed, law=_NOTHING) if self.settles else observed
+            return self.observed(index)
         assert record.reference is not None
         start, entry = self._starts[index], self._entries[index]
         added = self.loop.added[index]
         held = self._held_at[index]
         return Drive(record.reference, law, None, start, entry, record.elapsed_s, added, held)
+
+    def observed(self, index: int) -> Drive:
+        """Return what drives one run by its torque, its loop being known or not."""
+        observed = self._observed(index)
+        return replace(observed, law=_NOTHING) if self.settles else observed
 
     def _observed(self, index: int) -> Drive:
         record = self.records.records[index]

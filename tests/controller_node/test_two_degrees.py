@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from scipy.signal import BadCoefficients, lfilter, tf2ss
 
 from controller_node import pd_filtered, transfer_function
-from controller_node.law import as_transfer_function, law_of
+from controller_node.controller_file import describe, read_controller
+from controller_node.law import as_transfer_function, law_as_run, law_of
 from controller_node.polynomials import together
 from controller_node.transfer_function import TransferFunction
 from fjr_kit.errors import InputError
@@ -138,12 +139,62 @@ def test_the_cascade_is_what_its_words_say():
     r, y = signals()
     law = law_of(CASCADE, RATE)
     decay = np.exp(-900.0 / RATE)
-    velocity = lfilter([900.0, -900.0], [1.0, -decay], y)
+    velocity = lfilter([1.0 - decay], [1.0, -decay], RATE * np.diff(y, prepend=0.0))
     wanted = 12.0 * (r - y) - velocity
     speed = RATE * np.diff(r, prepend=0.0)
     forward = 1.5 * speed + 0.4 * RATE * np.diff(speed, prepend=0.0)
     expected = 40.0 * (wanted + np.cumsum(wanted) / RATE / 0.4) + forward
     assert np.allclose(by_steps(law, r, y), expected, rtol=1e-7, atol=1e-6)
+
+
+@pytest.mark.parametrize("filtered", [1.0, 300.0, 900.0, 5000.0])
+@pytest.mark.parametrize("described", [CASCADE, PID], ids=lambda d: d["kind"])
+def test_a_steady_speed_is_damped_by_the_gain_however_slow_its_filter(described, filtered):
+    own = {"n": filtered} if "n" in described else {"velocity_filter_rad_s": filtered}
+    plain = {key: value for key, value in described.items() if key not in own}
+    slow = np.array([1e-4])
+    damps = [law_of({**plain, **o}, RATE).response(slow, RATE)[1].imag for o in ({}, own)]
+    assert damps[0] == pytest.approx(damps[1], rel=1e-6)
+
+
+@pytest.mark.parametrize("between", ["held", "joined"])
+def test_a_law_that_runs_several_times_in_a_sample_is_the_loop_that_was_sampled(between):
+    steps, samples, slow = 8, 900, RATE / 8
+    coarse = 0.2 * np.sin(2 * np.pi * 3.0 * np.arange(samples) / slow) ** 3
+    inside = np.arange(samples * steps) / steps
+    if between == "held":
+        fine = coarse[inside.astype(int)]
+    else:
+        fine = np.interp(inside, np.arange(samples), coarse)
+    described = {**PID, "torque_limit_nm": 9.0}
+    truth = closed_loop.simulate(fine, RATE, PLANT, law_of(described, RATE))
+    law = law_as_run({**described, "rate_hz": RATE, "between_samples": between}, slow)
+    assert law.steps == steps
+    run = closed_loop.simulate(coarse, slow, PLANT, law)
+    assert np.array_equal(run.position, truth.position[::steps])
+    assert np.array_equal(run.reference, coarse)
+    mean = truth.torque.reshape(-1, steps).mean(axis=1)
+    assert np.allclose(run.torque, mean, rtol=0, atol=1e-12) and np.abs(truth.torque).max() == 9.0
+    made = law.torque(coarse, run.position)[5:]
+    assert np.std(made - mean[5:]) < 0.01 * np.std(mean)
+    frequency = np.array([0.5, 20.0])
+    expected = law_of(described, RATE).response(frequency, RATE)
+    assert np.allclose(law.response(frequency, slow), expected)
+
+
+def test_a_law_is_known_by_what_was_given_and_may_run_no_slower_than_its_record(tmp_path):
+    file = tmp_path / "pd.yaml"
+    file.write_text("{kind: pd, p: 40, d: 2, rate_hz: 1000}")
+    structure = read_controller(file)
+    entry = describe(structure, 100.0, "pd.yaml")
+    assert as_transfer_function(law_of(entry, 100.0)).steps == 1  # what a node can run
+    law = law_as_run(entry, 100.0)
+    assert law.steps == 10 and law.position[0] == pytest.approx(40.0 + 2.0 * 1000.0)
+    assert law_as_run(entry, 990.0).steps == 1
+    with pytest.raises(InputError, match=r"rate_hz is 1000 Hz, but the samples come at 2000 Hz"):
+        law_as_run(entry, 2000.0)
+    gains = {"kind": "pd", "p": None, "d": 2.0, "unknown": ["p"], "rate_hz": 1000.0}
+    assert law_as_run(gains, 100.0, {"p": 40.0}).position == pytest.approx(law.position)
 
 
 def test_a_record_cut_in_the_middle_is_simulated_on_from_its_states():
@@ -207,7 +258,8 @@ def test_the_frequency_response_is_that_of_the_default_law_and_of_the_loop():
     expected = values["p"] + values["d"] * values["n"] * (z - 1.0) / (z - decay)
     assert np.allclose(c_y, expected) and np.array_equal(c_r, c_y)
     c_r, c_y = law_of({**CASCADE, "feed_forward": {}}, RATE).response(frequency, RATE)
-    velocity = 900.0 * (1 - 1 / z) / (1 - np.exp(-0.9) / z)
+    smooth = (1 - np.exp(-0.9)) / (1 - np.exp(-0.9) / z)
+    velocity = smooth * RATE * (1 - 1 / z)
     inner = 40.0 * (1.0 + 1.0 / (RATE * 0.4) / (1 - 1 / z))
     assert np.allclose(c_r, 12.0 * inner) and np.allclose(c_y, inner * (12.0 + velocity))
 

@@ -10,7 +10,7 @@ from fjr_interface.experiment import RecordDescription
 from fjr_kit.errors import InputError
 from fjr_records.importers.import_map import parse_map
 from fjr_records.importers.importer import ImportOptions, Understood, read_files
-from fjr_records.importers.made_torque import MADE
+from fjr_records.importers.made_torque import MADE, ONCE
 from fjr_sim_node import plant
 from fjr_sim_node.plant import PLANT
 from fjr_sim_node.simulation import closed_loop
@@ -51,7 +51,7 @@ def test_the_torque_is_that_of_the_rig(tmp_path, begins):
     (record,) = found.records
     assert np.abs(torque).max() == 60.0  # so that the limit counts
     assert record.signals["u"] == pytest.approx(torque, abs=1e-6)
-    assert MADE in record.notes
+    assert MADE + ONCE in record.notes
     assert isinstance(found.descriptions[0], RecordDescription)
 
 
