@@ -105,7 +105,7 @@ def check_gates(
     gates = [
         whole,
         _one_grid(recorded),
-        _reference(recorded),
+        _reference(recorded).model_copy(update={"of_periods": True}),
         *(gate.model_copy(update=same) for gate in steady),
     ]
     if recorded.repeatable:

@@ -16,6 +16,7 @@ from ..which.comparison import CellFit
 from ..which.equivalents import founded, partners
 from ..which.found import Found
 from ..which.gains import gain, left_of, stands_for
+from ..which.seen_together import LACKED
 from .judgement import FEWEST_PARTS
 from .tested_causes import Tested, causes_with_tests
 
@@ -108,7 +109,7 @@ def kept(
         steps, tested = fewer, tests
     if tested and any(len(fit.effects) != count for count, fit in enumerate(steps)):
         steps = [steps[0], *_one_by_one(fitter, steps[-1], tested)]
-    return replace(found, steps=steps, notes=tuple(notes)), tested
+    return replace(found, steps=steps, notes=tuple(notes)), _bearing(tested)
 
 
 def _without(names: set[str], tested: Sequence[Tested]) -> list[Tested]:
@@ -129,6 +130,20 @@ def _bases(fitter: CellFitter, tested: Sequence[Tested], names: Sequence[str]) -
         for e in passed
         if fx.EFFECTS[e].modifies == t.effect and not founded([e], (), fitter.nominal, names)
     }
+
+
+def _bearing(tested: Sequence[Tested]) -> list[Tested]:
+    """Return the causes with the presence of those that modify them, where that is greater."""
+    return [
+        replace(
+            t,
+            borne=max(
+                (o.present for o in tested if fx.EFFECTS[o.effect].modifies == t.effect),
+                default=0.0,
+            ),
+        )
+        for t in tested
+    ]
 
 
 def _in_its_place(
@@ -272,7 +287,7 @@ def _guesses(tested: Sequence[Tested]) -> list[Tested]:
     """Return the causes beyond the two that gain most of which one is not sure.
 
     Each step tries the whole catalogue on what is left; the more steps, the likelier one of them
-    finds what resembles a part of the remainder.
+    finds what resembles a part of the remainder. Friction that the datasheet lacks is no guess.
     """
     further = sorted(tested, key=lambda t: -t.gain.mean)[_MAY_BE_UNSURE:]
-    return [t for t in further if t.present < SURE]
+    return [t for t in further if t.present < SURE and t.effect not in LACKED]

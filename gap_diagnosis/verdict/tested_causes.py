@@ -70,6 +70,7 @@ class Tested:
             left with it and all others; NaN where noise is not known.
         over_noise_closed: how much of what stands out of the noise without it, it closes; NaN where
             noise is not known.
+        borne: presence of a cause that modifies it, without which that one is nothing.
         in_band: how much of what is left without it, it closes where it gains most; see `closed`.
         beside_others: how much of what another cause does it closes there; see `beside_others`.
         ripples: how many of its ripples the motion passes; infinite for what has none.
@@ -89,6 +90,7 @@ class Tested:
     own_sizes: float = 0.0
     over_noise: float = math.nan
     over_noise_closed: float = math.nan
+    borne: float = 0.0
 
     @property
     def passed(self) -> bool:
@@ -183,7 +185,7 @@ class Tested:
             sure *= _UNCERTAIN
         if not self.invariant:
             sure *= 0.5
-        return min(sure, 0.99)
+        return max(min(sure, 0.99), self.borne)
 
 
 def causes_with_tests(

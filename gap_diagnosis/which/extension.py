@@ -117,7 +117,9 @@ class Extension:
         leaves most of it: a constant torque, say, moves the angle over which others ripple.
 
         Of those that unseen parts cannot tell from it, one that holds no other as a limit case, the
-        one with the fewest parameters, and then the commoner one.
+        one with the fewest parameters, and then the commoner one. None of them lacks a friction
+        that a datasheet lacks and that repeats beside it: every joint has it, and one of two
+        frictions does most of what both do.
         """
         gains = [gain(self._fitter, fit, parent, fit.acts) for fit in fits]
         present = [fit for fit, found in zip(fits, gains, strict=True) if found.present]
@@ -134,11 +136,23 @@ class Extension:
             return nearly_all
         first = repeating[0]
         gained = self.gain(first, parent).mean
-        alike = [f for f in repeating if f is first or stands_for(self._fitter, f, first, gained)]
+        alike = [
+            f
+            for f in repeating
+            if f is first
+            or (stands_for(self._fitter, f, first, gained) and not self._lacks_friction(f, first))
+        ]
         laws = [fit.effects for fit in alike]
         worth = [likelihood(self._fitter, fit, parent) for fit in alike]
         plain = [plainness(fit.effects, fit.space.effects, laws) for fit in alike]
         return alike[min(range(len(alike)), key=lambda k: (*plain[k], -worth[k]))]
+
+    def _lacks_friction(self, fit: CellFit, richer: CellFit) -> bool:
+        """Tell whether a fit lacks nothing of a richer one but what must be there, and repeats."""
+        further = {*richer.effects} - {*fit.effects}
+        if not {*fit.effects} < {*richer.effects} or not further & {*LACKED}:
+            return False
+        return self.gain(richer, fit).present
 
     def ranked(self, fits: Sequence[CellFit], parent: CellFit) -> list[CellFit]:
         """Return fits by what they gain over their parent, the best first."""

@@ -62,7 +62,9 @@ class Seen:
 
         Returns:
             Sets of two effects or more, the load last: the plainest one that does nearly as well as
-            the best, and those as plain; the set that explains most first.
+            the best, and those as plain; the set that explains most first. After each the same with
+            the frictions that every joint has, and no others: along moves of one speed they look
+            like rarer ones, or like each other, and only fits tell which is there.
         """
         return self._explaining(self._laws(effects), effects, {})
 
@@ -117,11 +119,18 @@ class Seen:
         found = []
         for load in sorted(plain, key=lambda load: left[load]):
             needed = self._needed(laws, load, effects)
-            names = [_effect(name) for name in needed] + ([load] if load else [])
-            model = self._regressed({n: laws.get(n) for n in needed}, load)[0]
-            if len(names) > 1 and model is not None:
+            common = [name for name in laws if _effect(name) in LACKED]
+            sets = [needed] if {*needed} <= {*common} else [needed, common]
+            for frictions in sets:
+                names = [_effect(name) for name in frictions] + ([load] if load else [])
                 own = {n: v for n, v in shape.items() if _effect(n) in names}
-                found.append((tuple(names), model.with_effects(own)))
+                models = [self._regressed({n: laws.get(n) for n in frictions}, load)[0]]
+                if frictions == common and models[0] is not None:
+                    nothing = [n for n in common if not models[0].effects.get(n)]
+                    models += [self._regressed({n: laws[n]}, load)[0] for n in nothing]
+                if len(names) > 1:
+                    each = [model for model in models if model is not None]
+                    found += [(tuple(names), model.with_effects(own)) for model in each]
         return found
 
     def _needed(

@@ -17,6 +17,7 @@ from .extension import Extension
 from .found import Found
 from .friction_left import FRICTION, lacks_friction
 from .gains import closed, left_of
+from .seen_together import LACKED
 
 MOST_CAUSES = 5
 _PARENTS = 3  # leading fits beside which a second cause is looked for
@@ -25,7 +26,8 @@ LEAST_CLOSED = 0.25
 """Least share of what is left, in the band where it gains most, that a further cause closes: one
 that closes less would not be named, for it may be a part of what no effect explains."""
 LEAST_CLOSED_LATER = 0.5
-"""The same for a third cause and any later one, of which one must be sure."""
+"""The same for a third cause and any later one, of which one must be sure; not for the friction that
+a datasheet lacks and every joint has."""
 _CERTAIN_CAUSES = 2
 _MUCH = 0.1
 """Share of the motion that an explanation misses, rms, above which something great is not found
@@ -146,8 +148,8 @@ class Stepwise:
         found.rivals[len(best.effects) + 1] = [
             *found.rivals.get(len(best.effects) + 1, []), *fits
         ]  # fmt: skip
-        least = self._least_closed(found)
-        return self.extension.chosen([f for f in fits if self._closes(f, best) >= least], best)
+        closing = [f for f in fits if self._closes(f, best) >= self._least_closed(f, found)]
+        return self.extension.chosen(closing, best)
 
     def _closes(self, fit: CellFit, before: CellFit) -> float:
         """Return how much a fit closes of the band in which it gains most, or of all if more.
@@ -162,6 +164,7 @@ class Stepwise:
         return time.monotonic() > self._until
 
     @staticmethod
-    def _least_closed(found: Found) -> float:
+    def _least_closed(fit: CellFit, found: Found) -> float:
         """Return how much of its best band a further cause must close to be named in the end."""
-        return LEAST_CLOSED if len(found.best.effects) < _CERTAIN_CAUSES else LEAST_CLOSED_LATER
+        sure = len(found.best.effects) < _CERTAIN_CAUSES or fit.effects[-1] in LACKED
+        return LEAST_CLOSED if sure else LEAST_CLOSED_LATER

@@ -15,6 +15,7 @@ from gap_diagnosis.verdict import kept_causes as kept_causes_module
 from gap_diagnosis.verdict.kept_causes import (
     SURE,
     _bases,
+    _bearing,
     _bears,
     _begun_anew,
     _bent,
@@ -383,6 +384,20 @@ def test_what_fails_again_and_again_ends(searched, monkeypatch):
     monkeypatch.setattr(kept_causes_module, "LEAST_BEARING", 0.0)
     found, tested = kept(fitter, Found(fits), SCATTER, lambda _: None, fits[-1].effects)
     assert len(tested) == len(found.best.effects) <= 2
+
+
+def test_what_a_present_cause_modifies_is_as_present_and_lacked_friction_is_no_guess(searched):
+    fitter, fits = searched
+    first, *_ = causes_with_tests(fitter, fits[-1], fits[0], SCATTER)
+    there = replace(first, effect="asymmetric_friction", gain=SURELY, certain=True)
+    doubtful = replace(first, effect="coulomb_friction", gain=Gain(0.5, 0.1, 0.6, 0.3))
+    assert doubtful.present < there.present
+    base, other = _bearing([doubtful, there])
+    assert base.present == there.present == other.present
+    unsure = [replace(there, effect=e, gain=Gain(m, m, 1.0, 0.04))
+              for e, m in (("delay", 9.0), ("torque_bias", 8.0), ("viscous_friction", 2.0),
+                           ("cogging", 1.0))]  # fmt: skip
+    assert [t.effect for t in _guesses(unsure)] == ["cogging"]
 
 
 def test_what_passing_causes_modify_stays_where_the_datasheet_lacks_it(searched):

@@ -26,7 +26,7 @@ EVERY = ("coulomb_friction", "viscous_friction", "load_friction", *LOADS)
 BARE = Model.nominal(datasheet({"jm": 2.0}, "joint"))
 
 
-def seen(inertia=0.0, coulomb=0.0, viscous=0.0, of_load=0.0, load=None, noise=0.0) -> Seen:
+def seen(inertia=0.0, coulomb=0.0, viscous=0.0, of_load=0.0, load=None, noise=0.0, drag=0.0):
     """Return what is seen of a joint that has more than the bare model; the load by its angle."""
     stamps = np.arange(4000) / 100.0
     angle = 1.2 * np.sin(0.9 * stamps) + 0.5 * np.sin(2.3 * stamps + 1.0)
@@ -35,6 +35,7 @@ def seen(inertia=0.0, coulomb=0.0, viscous=0.0, of_load=0.0, load=None, noise=0.
     angle, velocity, acceleration = angle[rows], velocity[rows], acceleration[rows]
     carried = np.zeros(angle.size) if load is None else load(angle)
     friction = (coulomb + of_load * np.abs(carried)) * np.sign(velocity) + viscous * velocity
+    friction += drag * velocity * np.abs(velocity)
     missing = -inertia * acceleration - friction + carried
     missing += noise * np.random.default_rng(3).standard_normal(angle.size)
     return Seen(BARE, angle, velocity, acceleration, missing)
@@ -67,6 +68,22 @@ def test_friction_under_load_is_told_from_that_of_the_motor():
     assert model.effects["load_friction.coefficient"] == pytest.approx(0.2, rel=0.2)
     without = tuple(name for name in EVERY if name != "load_friction")
     assert "load_friction" not in joint.together(without)[0][0]
+
+
+def test_the_frictions_of_every_joint_are_tried_beside_rarer_ones_and_in_place_of_each_other():
+    """Along moves of one speed friction is one number, whichever law makes it."""
+    joint = seen(0.3, 1.0, 0.5, of_load=0.2, load=lambda q: -8.0 * np.sin(q))
+    sets = [names for names, _ in joint.together(EVERY)]
+    plain = ("coulomb_friction", "viscous_friction", "gravity")
+    assert sets[0] != plain and plain in sets
+    fan = seen(drag=0.5, load=lambda q: -8.0 * np.sin(q))
+    every = (*EVERY, "quadratic_friction")
+    models = [model.effects for names, model in fan.together(every) if names == plain]
+    sizes = ("coulomb_friction.motor_nm", "viscous_friction.motor_nm_s_rad")
+    assert [[bool(model.get(size)) for size in sizes] for model in models] == [
+        [False, True],
+        [True, False],
+    ]
 
 
 def test_the_plainest_load_that_does_as_well_is_taken_and_none_where_there_is_none():

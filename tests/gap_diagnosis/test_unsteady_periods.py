@@ -36,14 +36,23 @@ KNOWN = ("actuator_lag", "torque_bias", "encoder_eccentricity")
 
 
 def warming_anew(
-    effects: dict[str, float], drift: Mapping[str, float] = WARMING, **settings: Any
+    effects: dict[str, float],
+    drift: Mapping[str, float] = WARMING,
+    hum_rad: float = 0.0,
+    **settings: Any,
 ) -> RecordedExperiment:
-    """Return an experiment each run of which starts cold: friction falls within it, not beyond."""
+    """Return an experiment each run of which starts cold: friction falls within it, not beyond.
+
+    Its reference hums at no line of the period.
+    """
     case = simulate_case(effects, seed=4, realizations=3, **{**SHORT, **settings})
     rng = np.random.default_rng(8)
     law = pd_filtered.CONTROLLER.check({})
     made = []
     for r in case.recorded.realizations:
+        stamps = np.arange(r.reference.size) / r.experiment.sample_rate_hz
+        hum = hum_rad * np.sin(2.0 * np.pi * 7.013 * stamps)
+        r = replace(r, reference=r.reference + hum.reshape(r.reference.shape))
         run = simulate(
             r.reference.ravel(),
             r.experiment.sample_rate_hz,
@@ -75,6 +84,17 @@ def test_a_cause_is_named_beside_a_drift_within_each_run():
 def test_a_drift_beside_which_nothing_is_found_stays_the_verdict():
     diagnosis = investigate(warming_anew({}), PLANT.defaults(), effects=KNOWN).diagnosis
     assert diagnosis.verdict == "nonstationary" and not diagnosis.causes
+
+
+def test_a_cause_is_named_beside_a_hum_of_the_reference():
+    """A part in a thousand of the reference that does not repeat is no reason to refuse a run."""
+    recorded = warming_anew({"actuator_lag.time_constant_s": LAG_S}, {}, hum_rad=1e-4)
+    gates = check_gates(recorded, Model.nominal(PLANT.defaults()))
+    assert gates.only_unsteady
+    assert "reference repeats" in [gate.name for gate in gates.failures]
+    diagnosis = investigate(recorded, PLANT.defaults(), effects=KNOWN).diagnosis
+    assert diagnosis.effects == ["actuator_lag"]
+    assert any("the reference differs between periods by" in note for note in diagnosis.notes)
 
 
 def test_a_record_that_is_damaged_is_not_searched():
