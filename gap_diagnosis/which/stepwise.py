@@ -26,8 +26,8 @@ LEAST_CLOSED = 0.25
 """Least share of what is left, in the band where it gains most, that a further cause closes: one
 that closes less would not be named, for it may be a part of what no effect explains."""
 LEAST_CLOSED_LATER = 0.5
-"""The same for a third cause and any later one, of which one must be sure; not for the friction that
-a datasheet lacks and every joint has."""
+"""The same for a third cause and any later one, of which one must be sure; not for the friction
+that a datasheet lacks and every joint has."""
 _CERTAIN_CAUSES = 2
 _MUCH = 0.1
 """Share of the motion that an explanation misses, rms, above which something great is not found
