@@ -1,7 +1,7 @@
 """Does a diagnosis find what plain machines have, where their datasheet is an inertia alone?
 
-Run `python benchmarks/plain_machines.py --kind swing --cases 12 --seed 0`, and so for `stairs` and
-`fan`. All are integrated here by laws of their own, not by the simulator that the diagnosis fits;
+Run `python benchmarks/plain_machines.py --kind swing --cases 12 --seed 0`, and so for the other
+kinds. All are integrated here by laws of their own, not by the simulator that the diagnosis fits;
 their friction scatters by 2 % from run to run, beside a torque that wanders.
 
 - `swing`: a pendulum that is let go without a motor, twice to four times from other angles; it has
@@ -10,6 +10,12 @@ their friction scatters by 2 % from run to run, beside a torque that wanders.
   one, as friction is measured; Coulomb and viscous friction, half of them with breakaway above.
 - `fan`: a drive that steps its torque and logs speed in rpm; the load grows with its square, beside
   Coulomb and viscous friction.
+- `leg`: a joint under a proportional and derivative law of 1 kHz or more, of which targets and
+  angles alone are logged, at 50 to 400 Hz: a swept sine or steps; friction, half of them gravity, a
+  third a delay of 4 ms. The law's file says at which rate it ran.
+- `servo`: a hobby servo that logs position in 4096 steps and current in coarse counts, at 50 to
+  200 Hz: a swept sine, sines, or moves of one speed; friction that falls from breakaway, half of
+  them gravity, half of them friction under that load. Its law is not told.
 
 Counted are what is missed, what is named but is not there, the ratio of each size to the truth
 (of a swing, both over their inertia), and how many of the intervals hold it.
@@ -35,13 +41,15 @@ from gap_diagnosis import read_nominal
 from gap_diagnosis.any_record import diagnose
 from gap_diagnosis.outcome.diagnosis import Diagnosis
 
-BRISTLE_RAD, ACCELERATES_S, INNER_HZ = 0.003, 0.5, 8000.0
+BRISTLE_RAD, ACCELERATES_S, INNER_HZ, SMOOTHED = 0.003, 0.5, 8000.0, 0.3
 SIZES = {
     "gravity.torque_nm": "gravity",
     "coulomb_friction.motor_nm": "coulomb",
     "viscous_friction.motor_nm_s_rad": "viscous",
     "quadratic_friction.motor_nm_s2_rad2": "quadratic",
     "stribeck_friction_motor.torque_nm": "breakaway",
+    "load_friction.coefficient": "of load",
+    "delay.time_s": "delay",
 }
 
 
@@ -52,9 +60,10 @@ class Machine:
     Attributes:
         truth: inertia, and sizes by the names of `SIZES`.
         rate_hz: of the records.
-        runs: (columns, samples) of each: time, position or speed, torque.
+        runs: (columns, samples) of each: time, position or speed, torque or target.
         position: unit of the second column.
         swings: whether sizes show over the inertia only.
+        law: file of the controller that made the torque, where targets were logged; or empty.
     """
 
     truth: dict[str, float]
@@ -62,6 +71,7 @@ class Machine:
     runs: list[np.ndarray]
     position: str = "1"
     swings: bool = False
+    law: str = ""
 
     def recorded(self, folder: Path, told: float) -> None:
         """Import the records and write a datasheet with an inertia."""
@@ -69,33 +79,50 @@ class Machine:
         files = [folder / f"run_{number}.csv" for number in range(len(self.runs))]
         for file, run in zip(files, self.runs, strict=True):
             np.savetxt(file, run.T, fmt="%.9g", delimiter=",", header="t,q,tau", comments="")
-        columns = parse_map(["time=t", "torque=tau:1", f"position=q:{self.position}"])
-        import_files(files, folder / "bags", ImportOptions(columns=columns))
+        law = folder / "law.yaml"
+        law.write_text(self.law)
+        third, laws = ("reference=tau:1", (law,)) if self.law else ("torque=tau:1", ())
+        columns = parse_map(["time=t", third, f"position=q:{self.position}"], described=bool(laws))
+        import_files(files, folder / "bags", ImportOptions(columns=columns, controllers=laws))
         (folder / "nominal.yaml").write_text(f"{{jm: {told!r}, k0: .inf}}\n")
 
 
 @numba.njit  # type: ignore[untyped-decorator]
 def moved(
-    wanted, gain, integral, angle, inertia, gravity, coulomb, viscous, quadratic, breakaway, fallen,
-    pushed, step, rate_hz, inner,
+    wanted, gain, integral, damping, late, angle, inertia, gravity, coulomb, viscous, quadratic,
+    breakaway, fallen, of_load, pushed, step, rate_hz, inner,
 ):  # fmt: skip
-    """Return position, mean torque and speed; with a gain it is wanted speeds, else torques."""
+    """Return position, mean torque and speed.
+
+    With damping it is wanted positions, with a gain alone speeds, else torques. The law runs twenty
+    times in a sample; its torque comes late by so many of its runs, its speed through a filter.
+    """
     dt, speed, bristle, sum_, torque = 1.0 / (rate_hz * inner), 0.0, 0.0, 0.0, 0.0
     every, found = max(inner // 20, 1), np.zeros((3, wanted.size))
+    smooth, runs, waiting = 0.0, 0, np.zeros(late + 1)
     for k in range(wanted.size):
         found[0, k], found[2, k] = np.round(angle / step) * step, speed
         for i in range(inner):
             if gain == 0.0:
                 torque = wanted[k]
             elif i % every == 0:
-                error = wanted[k] - speed
-                sum_ += integral * error * dt * every
-                torque = gain * error + sum_
-            level = coulomb + breakaway * np.exp(-((speed / fallen) ** 2))
+                smooth += SMOOTHED * (speed - smooth)
+                if damping > 0.0:
+                    counted = np.round(angle / step) * step
+                    asked = gain * (wanted[k] - counted) - damping * smooth
+                else:
+                    error = wanted[k] - speed
+                    sum_ += integral * error * dt * every
+                    asked = gain * error + sum_
+                waiting[runs % waiting.size] = asked
+                runs += 1
+                torque = waiting[runs % waiting.size]
+            load = gravity * np.sin(angle)
+            level = coulomb + breakaway * np.exp(-((speed / fallen) ** 2)) + of_load * abs(load)
             ends = BRISTLE_RAD if speed >= 0.0 else -BRISTLE_RAD
             bristle = ends + (bristle - ends) * np.exp(-abs(speed) * dt / BRISTLE_RAD)
             lost = level * bristle / BRISTLE_RAD + viscous * speed + quadratic * abs(speed) * speed
-            speed += dt * (torque + pushed[k] - lost - gravity * np.sin(angle)) / inertia
+            speed += dt * (torque + pushed[k] - lost - load) / inertia
             angle += dt * speed
             found[1, k] += torque / inner
     return found
@@ -103,17 +130,18 @@ def moved(
 
 def run_of(
     truth: dict[str, float], wanted: np.ndarray, rate_hz: float, rng: np.random.Generator,
-    wanders: float, *, gain: float = 0.0, integral: float = 0.0, angle: float = 0.0,
-    fallen: float = 1.0, step: float = 1e-6,
+    wanders: float, *, gain: float = 0.0, integral: float = 0.0, damping: float = 0.0,
+    angle: float = 0.0, fallen: float = 1.0, step: float = 1e-6,
 ) -> np.ndarray:  # fmt: skip
     """Return position, torque and speed of one run, (3, samples)."""
     share, size = 1.0 + 0.02 * rng.standard_normal(), truth.get
+    inner = max(int(INNER_HZ / rate_hz), 20)
+    late = round(size("delay", 0.0) * rate_hz * inner / max(inner // 20, 1))
     return moved(
-        wanted, gain, integral, angle, truth["inertia"], size("gravity", 0.0),
+        wanted, gain, integral, damping, late, angle, truth["inertia"], size("gravity", 0.0),
         share * truth["coulomb"], share * truth["viscous"], size("quadratic", 0.0),
-        share * size("breakaway", 0.0), fallen,
-        wanders * truth["coulomb"] * wandering(rng, wanted.size, rate_hz), step, rate_hz,
-        max(int(INNER_HZ / rate_hz), 20),
+        share * size("breakaway", 0.0), fallen, size("of load", 0.0),
+        wanders * truth["coulomb"] * wandering(rng, wanted.size, rate_hz), step, rate_hz, inner,
     )  # fmt: skip
 
 
@@ -186,9 +214,76 @@ def fan(rng: np.random.Generator) -> Machine:
     return Machine(truth, rate, runs, position="rpm")
 
 
+def leg(rng: np.random.Generator) -> Machine:
+    """Draw a joint whose targets and angles are logged more slowly than its law runs."""
+    rate, seconds = float(rng.choice([50, 100, 200, 400])), float(rng.choice([10, 20, 40]))
+    inertia, natural = 10.0 ** rng.uniform(-3, -0.5), 2.0 * np.pi * rng.uniform(2, 6)
+    gain, damping = inertia * natural**2, 2.0 * rng.uniform(0.2, 0.8) * inertia * natural
+    widest, highest_hz = rng.uniform(0.2, 0.8), min(rate / 12.0, rng.uniform(3, 8))
+    truth = {
+        "inertia": inertia,
+        "coulomb": gain * widest * rng.uniform(0.02, 0.25),
+        "viscous": damping * rng.uniform(0.1, 0.8),
+    }
+    if rng.random() < 0.5:
+        truth["gravity"] = gain * widest * rng.uniform(0.2, 0.8)
+    if rng.random() < 1.0 / 3.0:
+        truth["delay"] = 0.004
+    stamps, runs = np.arange(int(rate * seconds)) / rate, []
+    swept = np.sin(2.0 * np.pi * (0.1 * stamps + (highest_hz - 0.1) * stamps**2 / (2.0 * seconds)))
+    steps = np.sign(np.sin(np.pi * stamps)) * np.minimum(1.0, stamps)
+    for number in range(rng.integers(1, 4)):
+        target = widest * rng.uniform(0.6, 1.0) * (steps if number % 2 else swept)
+        found = run_of(
+            truth, target, rate, rng, 0.03, gain=gain, damping=damping, step=2.0 * np.pi / 2**16
+        )
+        runs.append(np.array([stamps, found[0], target]))
+    ran_hz = 20.0 * rate
+    filtered = -ran_hz * np.log(1.0 - SMOOTHED)
+    law = f"kind: pd\np: {gain}\nd: {damping}\nn: {filtered}\nderivative_on: measurement\n"
+    return Machine(truth, rate, runs, law=f"{law}rate_hz: {ran_hz}\n")
+
+
+def servo(rng: np.random.Generator) -> Machine:
+    """Draw a hobby servo that logs its current."""
+    rate, seconds = float(rng.choice([50, 100, 200])), float(rng.choice([10, 20, 40]))
+    inertia, natural = 10.0 ** rng.uniform(-3.5, -1.5), 2.0 * np.pi * rng.uniform(2, 6)
+    gain, damping = inertia * natural**2 * rng.uniform(1, 3), 1.4 * inertia * natural
+    widest = rng.uniform(0.3, 1.0)
+    usual = inertia * (3.0 * np.pi) ** 2 * widest
+    truth = {"inertia": inertia, "coulomb": usual * rng.uniform(0.2, 1.5)}
+    truth["viscous"] = usual * rng.uniform(0.05, 0.3) / (2.0 * np.pi * widest)
+    truth["breakaway"] = 0.3 * truth["coulomb"]
+    if rng.random() < 0.5:
+        truth["gravity"] = usual * rng.uniform(0.5, 2.0)
+        if rng.random() < 0.5:
+            truth["of load"] = 0.1
+    stamps, runs, count = np.arange(int(rate * seconds)) / rate, [], usual / 200.0
+    for _ in range(rng.integers(1, 5)):
+        kind = rng.integers(3)
+        if kind == 0:
+            target = np.sin(2.0 * np.pi * (0.1 * stamps + 0.75 * stamps**2 / seconds))
+        elif kind == 1:
+            waves = [np.sin(2.0 * np.pi * f * stamps + rng.uniform(0.0, 6.0))
+                     for f in rng.uniform(0.1, 1.5, 5)]  # fmt: skip
+            target = np.minimum(1.0, stamps) * sum(waves) / 3.0
+        else:
+            period = rng.uniform(2.0, 4.0)
+            phase = stamps % period / period
+            moves = np.where(phase < 0.5, 8.0 * phase - 1.0, 7.0 - 8.0 * phase)
+            target = np.clip(moves, -1.0, 1.0)
+        found = run_of(
+            truth, widest * target, rate, rng, 0.03, gain=gain, damping=damping, fallen=0.1,
+            angle=widest * target[0], step=2.0 * np.pi / 4096,
+        )  # fmt: skip
+        current = np.round(found[1] / count + 2.0 * rng.standard_normal(stamps.size))
+        runs.append(np.array([stamps, found[0], count * current]))
+    return Machine(truth, rate, runs)
+
+
 ALSO = {"presliding_friction", "encoder_quantization"}  # in all of them
 KINDS: dict[str, Callable[[np.random.Generator], Machine]] = {
-    "swing": swing, "stairs": stairs, "fan": fan,
+    "swing": swing, "stairs": stairs, "fan": fan, "leg": leg, "servo": servo,
 }  # fmt: skip
 
 

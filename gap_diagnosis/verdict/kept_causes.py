@@ -51,7 +51,8 @@ def kept(
     A cause whose size alone is not certain may be blurred by another one: then that goes which
     gains least of all. Of those that pass, what names another one twice goes, and what is not sure,
     but for the two that gain most and for what others cannot do without: a cause that is sure is
-    lost where the fit lacks what it acts beside. Where too little is held out, no cause is kept.
+    lost where the fit lacks what it acts beside. Friction that the datasheet lacks stays unless
+    something is against it: without it all else would bend to do what it does. Where too little is held out, no cause is kept.
 
     Args:
         fitter: of the search.
@@ -79,7 +80,7 @@ def kept(
 
     while steps[-1].effects:
         tested = tested or tests_of(steps[-1])
-        stay = {*bearing, *_bases(fitter, tested, names)}
+        stay = {*bearing, *_bases(fitter, tested, names), *_lacked(tested)}
         free = _without(stay, tested)
         failed = [t for t in free if not t.passed]
         failed = failed or _without(stay, _twice(fitter, steps[-1], tested))
@@ -144,6 +145,16 @@ def _bearing(tested: Sequence[Tested]) -> list[Tested]:
         )
         for t in tested
     ]
+
+
+def _lacked(tested: Sequence[Tested]) -> set[str]:
+    """Return the frictions that the datasheet lacks and every joint has, which may well be there.
+
+    They are told with how sure they are; of few parts hardly any cause repeats surely.
+    """
+    return {
+        t.effect for t in tested if t.effect in LACKED and t.gains and t.present >= LEAST_BEARING
+    }
 
 
 def _in_its_place(

@@ -108,8 +108,13 @@ class Tested:
     @property
     def nearly_passes(self) -> bool:
         """Whether nothing is against it but that it is not sure enough, or repeats less often."""
-        gains = self.gain.mean > LEAST_GAIN and self.gain.p <= MOST_P
-        return self.certain and gains and self._closes and self.bounded is None and self.invariant
+        return self.gains and self.gain.p <= MOST_P
+
+    @property
+    def gains(self) -> bool:
+        """Whether nothing is against it but that few parts gain, or that it is not sure enough."""
+        there = self.gain.mean > LEAST_GAIN and self._closes and self.bounded is None
+        return there and self.certain and self.invariant
 
     @property
     def nearest_kin(self) -> bool:

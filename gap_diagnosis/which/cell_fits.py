@@ -23,7 +23,7 @@ from .ripples import Ripples
 from .ripples_passed import fewest_cycles
 from .screening import LARGEST, LARGEST_OF_TORQUES, Proposal, Screening, as_they_are
 from .search_space import Space, space_for, starts
-from .seen_together import LOADS
+from .seen_together import LACKED, LOADS
 from .seen_torques import FRICTIONS, SeenTorques
 
 STICKING = ("coulomb_friction", "presliding_friction")
@@ -192,6 +192,9 @@ class CellFitter(ReweightedFits):
     ) -> CellFit | None:
         """Fit a parent's explanation with one effect more; None if no start promises anything.
 
+        Friction that the datasheet lacks is fitted from its best start, whatever that promises: a
+        fit without it has bent all else to do what it does.
+
         Args:
             parent: the explanation to extend.
             effect: identifier of the effect to add.
@@ -205,7 +208,8 @@ class CellFitter(ReweightedFits):
         numbers = self.weights.numbers(parent.variance).sum()
         rival = proposals[0][0] + _RIVAL * numbers if proposals else begun
         for cost, space, point in proposals:
-            if cost > min(begun - _LEAST_PROMISE, rival) or len(kept) == most:
+            promises = cost <= begun - _LEAST_PROMISE or (effect in LACKED and not kept)
+            if not promises or cost > rival or len(kept) == most:
                 break
             if any(space is one for one in kept):
                 continue

@@ -11,6 +11,7 @@ from fjr_sim_node import effects as fx
 from .cell_fits import STICKING, CellFitter
 from .comparison import NOTHING_LEFT, CellFit
 from .equivalents import ONE_CAUSE, founded, holders, partners, plainness
+from .friction_left import FRICTION
 from .gains import NEARLY_ALL, Gain, closed, gain, left_of, likelihood, stands_for
 from .harmonics import WORTH_A_HARMONIC, with_second_harmonic
 from .screening import Proposal, Screening
@@ -71,7 +72,7 @@ class Extension:
         ordered = sorted((e for e in proposals if proposals[e]), key=lambda e: proposals[e][0][0])
         chosen = self._worth_a_fit(parent, proposals, ordered[: _FITTED[later]])
         held = founded(holders(chosen[:2], names), parent.effects, nominal, names)
-        alike = {*partners(chosen[:2], set(effects), nominal), *held}
+        alike = {*partners(chosen[:2], set(effects), nominal), *held, *({*LACKED} & {*effects})}
         for effect in sorted(alike - set(chosen)):
             if effect not in proposals:
                 again = screened.get(effect) or self._fitter.screening(parent, effect)
@@ -117,9 +118,9 @@ class Extension:
         leaves most of it: a constant torque, say, moves the angle over which others ripple.
 
         Of those that unseen parts cannot tell from it, one that holds no other as a limit case, the
-        one with the fewest parameters, and then the commoner one. None of them lacks a friction
-        that a datasheet lacks and that repeats beside it: every joint has it, and one of two
-        frictions does most of what both do.
+        one with the fewest parameters, and then the commoner one. None of them is a part of that one
+        which lacks a law of friction that repeats: where a datasheet lacks all friction, one of two
+        laws does most of what both do.
         """
         gains = [gain(self._fitter, fit, parent, fit.acts) for fit in fits]
         present = [fit for fit, found in zip(fits, gains, strict=True) if found.present]
@@ -148,9 +149,9 @@ class Extension:
         return alike[min(range(len(alike)), key=lambda k: (*plain[k], -worth[k]))]
 
     def _lacks_friction(self, fit: CellFit, richer: CellFit) -> bool:
-        """Tell whether a fit lacks nothing of a richer one but what must be there, and repeats."""
+        """Tell whether a fit lacks of a richer one a law of friction, which repeats there."""
         further = {*richer.effects} - {*fit.effects}
-        if not {*fit.effects} < {*richer.effects} or not further & {*LACKED}:
+        if not {*fit.effects} < {*richer.effects} or not further & {*FRICTION}:
             return False
         return self.gain(richer, fit).present
 

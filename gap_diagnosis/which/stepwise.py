@@ -61,7 +61,32 @@ class Stepwise:
 
     def run(self, refit: CellFit) -> Found:
         """Search forward from the fit of the base parameters alone."""
-        found = Found([refit])
+        found = self._onward(Found([refit]))
+        other = self._from_both_frictions(found)
+        return other if other is not None and self._better(other, found) else found
+
+    def _from_both_frictions(self, found: Found) -> Found | None:
+        """Search anew from the frictions that the datasheet lacks and every joint has.
+
+        Where one of them alone did as well at first, all else was bent to do what the other does;
+        no start leads from there to both. None if both were found, or nothing is left.
+        """
+        both, best = {*LACKED}, found.best
+        if both <= {*best.effects} or not both <= {*self.extension.effects} or self._over:
+            return None
+        if self._fitter.left_in_a_band(best) < NOTHING_LEFT:
+            return None
+        begun = [fit for fit in found.rivals.get(1, []) if both <= {*fit.effects}]
+        if not begun:
+            return None
+        first = self.extension.ranked(begun, found.steps[0])[0]
+        return self._onward(Found([found.steps[0], first], rivals={1: found.rivals[1]}))
+
+    def _better(self, other: Found, found: Found) -> bool:
+        return self.extension.gain(other.best, found.best).present
+
+    def _onward(self, found: Found) -> Found:
+        """Add to what was found, cause after cause."""
         while len(found.best.effects) < MOST_CAUSES:
             if self._fitter.left_in_a_band(found.best) < NOTHING_LEFT:
                 break
