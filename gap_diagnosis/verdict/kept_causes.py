@@ -52,7 +52,8 @@ def kept(
     gains least of all. Of those that pass, what names another one twice goes, and what is not sure,
     but for the two that gain most and for what others cannot do without: a cause that is sure is
     lost where the fit lacks what it acts beside. Friction that the datasheet lacks stays unless
-    something is against it: without it all else would bend to do what it does. Where too little is held out, no cause is kept.
+    something is against it: without it all else would bend to do what it does. Where too little is
+    held out, no cause is kept.
 
     Args:
         fitter: of the search.

@@ -118,9 +118,9 @@ class Extension:
         leaves most of it: a constant torque, say, moves the angle over which others ripple.
 
         Of those that unseen parts cannot tell from it, one that holds no other as a limit case, the
-        one with the fewest parameters, and then the commoner one. None of them is a part of that one
-        which lacks a law of friction that repeats: where a datasheet lacks all friction, one of two
-        laws does most of what both do.
+        one with the fewest parameters, and then the commoner one. None of them is a part of it that
+        lacks a law of friction which repeats: where a datasheet lacks all friction, one of two laws
+        does most of what both do.
         """
         gains = [gain(self._fitter, fit, parent, fit.acts) for fit in fits]
         present = [fit for fit, found in zip(fits, gains, strict=True) if found.present]

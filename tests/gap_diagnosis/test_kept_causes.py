@@ -13,6 +13,7 @@ from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.outcome.diagnosis import Estimate
 from gap_diagnosis.verdict import kept_causes as kept_causes_module
 from gap_diagnosis.verdict.kept_causes import (
+    LEAST_BEARING,
     SURE,
     _bases,
     _bearing,
@@ -22,6 +23,7 @@ from gap_diagnosis.verdict.kept_causes import (
     _changing,
     _guesses,
     _kin,
+    _lacked,
     _one_by_one,
     _twice,
     kept,
@@ -384,6 +386,24 @@ def test_what_fails_again_and_again_ends(searched, monkeypatch):
     monkeypatch.setattr(kept_causes_module, "LEAST_BEARING", 0.0)
     found, tested = kept(fitter, Found(fits), SCATTER, lambda _: None, fits[-1].effects)
     assert len(tested) == len(found.best.effects) <= 2
+
+
+def test_friction_that_a_datasheet_lacks_stays_unless_something_is_against_it(searched):
+    fitter, fits = searched
+    tested = causes_with_tests(fitter, fits[-1], fits[0], SCATTER)
+    first = max(tested, key=lambda t: t.present)
+    seldom = replace(first, effect="viscous_friction", gain=Gain(5.0, 4.0, 0.8, 0.1))
+    assert not seldom.passed and seldom.gains and seldom.present >= LEAST_BEARING
+    assert _lacked([seldom]) == {"viscous_friction"}
+    for other in (
+        {"effect": "torque_bias"},
+        {"certain": False},
+        {"bounded": "viscous_friction.motor_nm_s_rad"},
+        {"gain": Gain(0.9, 0.8, 0.8, 0.1)},
+        {"gain": Gain(5.0, 4.0, 0.8, 0.2)},
+        {"invariance_p": 1e-4, "own_sizes": 0.1},
+    ):
+        assert _lacked([replace(seldom, **other)]) == set()
 
 
 def test_what_a_present_cause_modifies_is_as_present_and_lacked_friction_is_no_guess(searched):
