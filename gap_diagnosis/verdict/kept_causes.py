@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 
 from fjr_sim_node import effects as fx
@@ -16,7 +16,7 @@ from ..which.comparison import CellFit
 from ..which.equivalents import founded, partners
 from ..which.found import Found
 from ..which.gains import gain, left_of, stands_for
-from ..which.seen_together import LACKED
+from ..which.seen_together import lacked
 from .judgement import FEWEST_PARTS
 from .tested_causes import Tested, causes_with_tests
 
@@ -72,6 +72,7 @@ def kept(
     tested: list[Tested] = []
     if steps[-1].effects:
         steps[-1] = fitter.settled(steps[-1])
+    lacking = lacked(fitter.nominal)
     replaced: set[str] = set()
     bearing: set[str] = set()
 
@@ -81,11 +82,11 @@ def kept(
 
     while steps[-1].effects:
         tested = tested or tests_of(steps[-1])
-        stay = {*bearing, *_bases(fitter, tested, names), *_lacked(tested)}
+        stay = {*bearing, *_bases(fitter, tested, names), *_lacked(lacking, tested)}
         free = _without(stay, tested)
         failed = [t for t in free if not t.passed]
         failed = failed or _without(stay, _twice(fitter, steps[-1], tested))
-        guessed = [] if failed else _without(stay, _guesses(tested))
+        guessed = [] if failed else _without(stay, _guesses(tested, lacking))
         failed = failed or guessed
         if not failed:
             break
@@ -148,13 +149,13 @@ def _bearing(tested: Sequence[Tested]) -> list[Tested]:
     ]
 
 
-def _lacked(tested: Sequence[Tested]) -> set[str]:
+def _lacked(lacking: Collection[str], tested: Sequence[Tested]) -> set[str]:
     """Return the frictions that the datasheet lacks and every joint has, which may well be there.
 
     They are told with how sure they are; of few parts hardly any cause repeats surely.
     """
     return {
-        t.effect for t in tested if t.effect in LACKED and t.gains and t.present >= LEAST_BEARING
+        t.effect for t in tested if t.effect in lacking and t.gains and t.present >= LEAST_BEARING
     }
 
 
@@ -295,11 +296,11 @@ def _twice(fitter: CellFitter, best: CellFit, tested: Sequence[Tested]) -> list[
     return [t for t in tested if t.effect in found]
 
 
-def _guesses(tested: Sequence[Tested]) -> list[Tested]:
+def _guesses(tested: Sequence[Tested], lacking: Collection[str] = ()) -> list[Tested]:
     """Return the causes beyond the two that gain most of which one is not sure.
 
     Each step tries the whole catalogue on what is left; the more steps, the likelier one of them
     finds what resembles a part of the remainder. Friction that the datasheet lacks is no guess.
     """
     further = sorted(tested, key=lambda t: -t.gain.mean)[_MAY_BE_UNSURE:]
-    return [t for t in further if t.present < SURE and t.effect not in LACKED]
+    return [t for t in further if t.present < SURE and t.effect not in lacking]

@@ -23,7 +23,7 @@ from .ripples import Ripples
 from .ripples_passed import fewest_cycles
 from .screening import LARGEST, LARGEST_OF_TORQUES, Proposal, Screening, as_they_are
 from .search_space import Space, space_for, starts
-from .seen_together import LACKED, LOADS
+from .seen_together import LOADS, lacked
 from .seen_torques import FRICTIONS, SeenTorques
 
 STICKING = ("coulomb_friction", "presliding_friction")
@@ -208,7 +208,9 @@ class CellFitter(ReweightedFits):
         numbers = self.weights.numbers(parent.variance).sum()
         rival = proposals[0][0] + _RIVAL * numbers if proposals else begun
         for cost, space, point in proposals:
-            promises = cost <= begun - _LEAST_PROMISE or (effect in LACKED and not kept)
+            promises = cost <= begun - _LEAST_PROMISE or (
+                not kept and effect in lacked(self.nominal)
+            )
             if not promises or cost > rival or len(kept) == most:
                 break
             if any(space is one for one in kept):

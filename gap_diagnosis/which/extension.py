@@ -15,7 +15,7 @@ from .friction_left import FRICTION
 from .gains import NEARLY_ALL, Gain, closed, gain, left_of, likelihood, stands_for
 from .harmonics import WORTH_A_HARMONIC, with_second_harmonic
 from .screening import Proposal, Screening
-from .seen_together import LACKED
+from .seen_together import LACKED, lacked
 
 _PROPOSED, _FITTED, _STARTS = (7, 5), (5, 3), (2, 1)
 """Effects that are tried at several sizes, those of them that are fitted, and from how many starts:
@@ -72,7 +72,11 @@ class Extension:
         ordered = sorted((e for e in proposals if proposals[e]), key=lambda e: proposals[e][0][0])
         chosen = self._worth_a_fit(parent, proposals, ordered[: _FITTED[later]])
         held = founded(holders(chosen[:2], names), parent.effects, nominal, names)
-        alike = {*partners(chosen[:2], set(effects), nominal), *held, *({*LACKED} & {*effects})}
+        alike = {
+            *partners(chosen[:2], set(effects), nominal),
+            *held,
+            *(lacked(nominal) & {*effects}),
+        }
         for effect in sorted(alike - set(chosen)):
             if effect not in proposals:
                 again = screened.get(effect) or self._fitter.screening(parent, effect)

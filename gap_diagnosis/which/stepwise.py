@@ -17,7 +17,7 @@ from .extension import Extension
 from .found import Found
 from .friction_left import FRICTION, lacks_friction
 from .gains import closed, left_of
-from .seen_together import LACKED
+from .seen_together import LACKED, lacked
 
 MOST_CAUSES = 5
 _PARENTS = 3  # leading fits beside which a second cause is looked for
@@ -57,6 +57,7 @@ class Stepwise:
             misses: how much of the motion an explanation misses, as a share.
         """
         self._fitter, self._until, self._misses = fitter, until, misses
+        self._lacked = lacked(fitter.nominal)
         self.extension = Extension(fitter, effects, progress)
 
     def run(self, refit: CellFit) -> Found:
@@ -72,6 +73,8 @@ class Stepwise:
         no start leads from there to both. None if both were found, or nothing is left.
         """
         both, best = {*LACKED}, found.best
+        if not both <= self._lacked:
+            return None
         if both <= {*best.effects} or not both <= {*self.extension.effects} or self._over:
             return None
         if self._fitter.left_in_a_band(best) < NOTHING_LEFT:
@@ -188,8 +191,7 @@ class Stepwise:
     def _over(self) -> bool:
         return time.monotonic() > self._until
 
-    @staticmethod
-    def _least_closed(fit: CellFit, found: Found) -> float:
+    def _least_closed(self, fit: CellFit, found: Found) -> float:
         """Return how much of its best band a further cause must close to be named in the end."""
-        sure = len(found.best.effects) < _CERTAIN_CAUSES or fit.effects[-1] in LACKED
+        sure = len(found.best.effects) < _CERTAIN_CAUSES or fit.effects[-1] in self._lacked
         return LEAST_CLOSED if sure else LEAST_CLOSED_LATER

@@ -35,6 +35,7 @@ from gap_diagnosis.which.found import Found
 from gap_diagnosis.which.gains import Gain, beside_others
 from gap_diagnosis.which.presence import beyond_zero
 
+BOTH = ("coulomb_friction", "viscous_friction")
 SURELY = Gain(30.0, 25.0, 1.0, 1e-5)
 CAUSES = {"torque_bias.torque_nm": 4.0, "delay.time_s": 1e-3}
 
@@ -394,7 +395,8 @@ def test_friction_that_a_datasheet_lacks_stays_unless_something_is_against_it(se
     first = max(tested, key=lambda t: t.present)
     seldom = replace(first, effect="viscous_friction", gain=Gain(5.0, 4.0, 0.8, 0.1))
     assert not seldom.passed and seldom.gains and seldom.present >= LEAST_BEARING
-    assert _lacked([seldom]) == {"viscous_friction"}
+    assert _lacked(BOTH, [seldom]) == {"viscous_friction"}
+    assert _lacked((), [seldom]) == set()
     for other in (
         {"effect": "torque_bias"},
         {"certain": False},
@@ -403,7 +405,7 @@ def test_friction_that_a_datasheet_lacks_stays_unless_something_is_against_it(se
         {"gain": Gain(5.0, 4.0, 0.8, 0.2)},
         {"invariance_p": 1e-4, "own_sizes": 0.1},
     ):
-        assert _lacked([replace(seldom, **other)]) == set()
+        assert _lacked(BOTH, [replace(seldom, **other)]) == set()
 
 
 def test_what_a_present_cause_modifies_is_as_present_and_lacked_friction_is_no_guess(searched):
@@ -417,7 +419,7 @@ def test_what_a_present_cause_modifies_is_as_present_and_lacked_friction_is_no_g
     unsure = [replace(there, effect=e, gain=Gain(m, m, 1.0, 0.04))
               for e, m in (("delay", 9.0), ("torque_bias", 8.0), ("viscous_friction", 2.0),
                            ("cogging", 1.0))]  # fmt: skip
-    assert [t.effect for t in _guesses(unsure)] == ["cogging"]
+    assert [t.effect for t in _guesses(unsure, BOTH)] == ["cogging"]
 
 
 def test_what_passing_causes_modify_stays_where_the_datasheet_lacks_it(searched):

@@ -20,7 +20,7 @@ from fjr_sim_node.simulation.closed_loop import simulate_law
 from gap_diagnosis.any_record import diagnose, investigate
 from gap_diagnosis.model.nominal import datasheet
 from gap_diagnosis.model.rig_model import Model
-from gap_diagnosis.which.seen_together import LOADS, Seen, load_parameters, solved
+from gap_diagnosis.which.seen_together import LOADS, Seen, lacked, load_parameters, solved
 
 EVERY = ("coulomb_friction", "viscous_friction", "load_friction", *LOADS)
 BARE = Model.nominal(datasheet({"jm": 2.0}, "joint"))
@@ -105,6 +105,14 @@ def test_one_cause_alone_and_what_pushes_are_left_to_the_usual_search():
     assert seen(0.1, -1.0, 0.5, noise=0.01).together(("coulomb_friction", "viscous_friction")) == []
     assert seen(-2.5, 1.0, 0.5, noise=0.01).together(EVERY) == []  # no inertia would be left
     assert load_parameters("external_spring", [-1.0, 0.0]) is None
+
+
+def test_a_datasheet_lacks_a_friction_that_it_has_nowhere():
+    bare = datasheet({"jm": 2.0}, "joint")
+    assert lacked(bare) == {"coulomb_friction", "viscous_friction"}
+    assert lacked(datasheet({"jm": 2.0, "fsm": 1.0}, "joint")) == {"viscous_friction"}
+    axis = {"jm": 1.0, "j": 1.0, "k0": 100.0, "fsm": 0.1, "fv": 0.2}
+    assert lacked(datasheet(axis, "axis")) == frozenset()
 
 
 def test_columns_of_any_size_are_solved():
