@@ -302,5 +302,6 @@ def _guesses(tested: Sequence[Tested], lacking: Collection[str] = ()) -> list[Te
     Each step tries the whole catalogue on what is left; the more steps, the likelier one of them
     finds what resembles a part of the remainder. Friction that the datasheet lacks is no guess.
     """
-    further = sorted(tested, key=lambda t: -t.gain.mean)[_MAY_BE_UNSURE:]
-    return [t for t in further if t.present < SURE and t.effect not in lacking]
+    found = [t for t in tested if t.effect not in lacking]
+    further = sorted(found, key=lambda t: -t.gain.mean)[_MAY_BE_UNSURE:]
+    return [t for t in further if t.present < SURE]

@@ -417,7 +417,7 @@ def test_what_a_present_cause_modifies_is_as_present_and_lacked_friction_is_no_g
     base, other = _bearing([doubtful, there])
     assert base.present == there.present == other.present
     unsure = [replace(there, effect=e, gain=Gain(m, m, 1.0, 0.04))
-              for e, m in (("delay", 9.0), ("torque_bias", 8.0), ("viscous_friction", 2.0),
+              for e, m in (("delay", 9.0), ("viscous_friction", 8.0), ("torque_bias", 2.0),
                            ("cogging", 1.0))]  # fmt: skip
     assert [t.effect for t in _guesses(unsure, BOTH)] == ["cogging"]
 
