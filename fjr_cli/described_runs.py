@@ -102,6 +102,11 @@ class RunOptions:
         structure = controller_file.read_controller(self.controller)
         rate = campaign.values["excitation"]["sample_rate_hz"]
         law = controller_file.describe(structure, rate, str(self.controller))
+        if structure.steps(rate, f"{self.controller}: controller") > 1 and self.record is None:
+            raise InputError(
+                f"{self.controller}: controller.rate_hz is above the {rate:g} Hz of the samples, "
+                "which records alone can have; add --record, or leave rate_hz out."
+            )
         if "unknown" in law:
             raise InputError(
                 f"{self.controller}: {law['unknown'][0]} is unknown; give its value here."

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from controller_node.law import law_of
+from controller_node.law import law_as_run, law_of
 from excitation_node import multisine, record_experiment
 from fjr_interface.experiment import Experiment, RecordDescription
 from fjr_interface.parameters import Parameter, ParameterGroup
@@ -107,11 +107,12 @@ def _closed_loop(
     if experiment.controller is None:
         raise InputError("experiment description: controller is missing, so the loop is not known.")
     rate = experiment.sample_rate_hz
+    law, as_run = law_of(experiment.controller, rate), law_as_run(experiment.controller, rate)
     run = simulate(
         reference,
         rate,
         plant.coefficients(values),
-        law_of(experiment.controller, rate),
+        as_run if as_run.steps > 1 else law,
         noise,
         effects.coefficients(values),
         _elapsed_s(experiment, reference.size),

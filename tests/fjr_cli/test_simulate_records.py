@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from controller_node.law import law_of
+from controller_node.law import law_as_run, law_of
 from fjr_records.records import read_records
 from gap_diagnosis.model.controller_check import check_law
+from gap_diagnosis.model.record_loop import explained
 
 SHORT = ["--realizations", "2", "--workers", "1"]
 CASCADE = (
@@ -36,6 +37,25 @@ def test_records_of_each_kind_come_with_their_controller(tmp_path, run, kind):
         one = {**each.controller["position"], "kind": "transfer_function"}
         other = law_of({**one, "torque_limit_nm": 20.0}, 1000.0)
         assert not check_law(other, *signals).passed
+
+
+def test_a_law_that_runs_faster_than_its_record_is_played_as_it_runs(tmp_path, run):
+    file = tmp_path / "law.yaml"
+    file.write_text("{kind: pd, p: 2000, d: 60, derivative_on: measurement, rate_hz: 2000}")
+    nodes = ("excitation", "controller", "simulator")
+    slow = [text for node in nodes for text in ("--set", f"{node}.sample_rate_hz=200")]
+    slow += ["--controller", str(file), *SHORT]
+    done = run(
+        "simulate", "--record", "chirp", "--duration", 5, *slow, "--out", tmp_path / "bags",
+        "--set", "excitation.f_max_hz=10", "--level", 0.1,
+    )  # fmt: skip
+    assert done.exit_code == 0, done.output
+    (first, _) = read_records(tmp_path / "bags").records
+    assert explained(law_as_run(first.controller, 200.0), first) > 0.99
+    assert explained(law_of(first.controller, 200.0), first) < 0.9
+    done = run("simulate", *slow, "--out", tmp_path / "multisine")
+    assert done.exit_code == 2 and "controller.rate_hz is above the 200 Hz" in done.output
+    assert not (tmp_path / "multisine").exists()
 
 
 def test_a_multisine_with_a_cascade_and_a_reference_from_a_file(tmp_path, run):
