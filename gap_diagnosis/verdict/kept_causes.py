@@ -154,9 +154,8 @@ def _lacked(lacking: Collection[str], tested: Sequence[Tested]) -> set[str]:
 
     They are told with how sure they are; of few parts hardly any cause repeats surely.
     """
-    return {
-        t.effect for t in tested if t.effect in lacking and t.gains and t.present >= LEAST_BEARING
-    }
+    there = [t for t in tested if t.known_though_it_drifts and t.present >= LEAST_BEARING]
+    return {t.effect for t in there if t.effect in lacking}
 
 
 def _in_its_place(

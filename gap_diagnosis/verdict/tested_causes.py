@@ -113,8 +113,20 @@ class Tested:
     @property
     def gains(self) -> bool:
         """Whether nothing is against it but that few parts gain, or that it is not sure enough."""
-        there = self.gain.mean > LEAST_GAIN and self._closes and self.bounded is None
-        return there and self.certain and self.invariant
+        return self._closes and self._well_known
+
+    @property
+    def known_though_it_drifts(self) -> bool:
+        """Whether it gains, and surely where the squared error grows with it.
+
+        Where a recorded torque drives the model, how far that drifts holds most of the squares.
+        """
+        return self._well_known and (self._closes or self.gain.present)
+
+    @property
+    def _well_known(self) -> bool:
+        gains = self.gain.mean > LEAST_GAIN and self.bounded is None
+        return gains and self.certain and self.invariant
 
     @property
     def nearest_kin(self) -> bool:

@@ -397,6 +397,10 @@ def test_friction_that_a_datasheet_lacks_stays_unless_something_is_against_it(se
     assert not seldom.passed and seldom.gains and seldom.present >= LEAST_BEARING
     assert _lacked(BOTH, [seldom]) == {"viscous_friction"}
     assert _lacked((), [seldom]) == set()
+    grown = seldom.share.model_copy(update={"value": -0.1, "low": -0.2, "high": -0.05})
+    drifting = replace(seldom, share=grown)
+    assert not drifting.gains and _lacked(BOTH, [drifting]) == set()
+    assert _lacked(BOTH, [replace(drifting, gain=SURELY)]) == {"viscous_friction"}
     for other in (
         {"effect": "torque_bias"},
         {"certain": False},
