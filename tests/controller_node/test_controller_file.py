@@ -57,16 +57,19 @@ def test_cascade_with_integral_and_feed_forward(tmp_path):
     np.testing.assert_allclose(torque(law, r, y), expected, rtol=1e-8, atol=1e-6)
 
 
-def test_the_law_of_the_node_is_kept_as_it_is(tmp_path):
+def test_the_law_of_the_node_is_kept_as_it_is_and_that_of_drives_damps_by_its_gain(tmp_path):
+    """Right after a step the node's law is D N; drives low-pass a difference of D/Ts."""
     law = described(tmp_path, "kind: pd_filtered\np: 200\nd: 60\nn: 24\ntorque_limit_nm: 9\n")
     assert law == {"kind": "pd_filtered", "p": 200, "d": 60, "n": 24, "torque_limit_nm": 9.0}
     own = pd_filtered.from_description(law, RATE)
     same = described(tmp_path, "kind: pd\np: 200\nd: 60\nn: 24\ntorque_limit_nm: 9\n")
     assert same["kind"] == ONE_DEGREE and same["torque_limit_nm"] == 9.0
-    expected = TransferFunction.of_pd(pd_filtered.coefficients(own))
-    found = law_of(same, RATE)
-    np.testing.assert_allclose(found.position, expected.position)
-    np.testing.assert_allclose(found.denominator, expected.denominator)
+    node = TransferFunction.of_pd(pd_filtered.coefficients(own))
+    found, decay = law_of(same, RATE), np.exp(-24.0 / RATE)
+    difference = 60.0 * RATE * (1.0 - decay) * np.array([1.0, -1.0])
+    np.testing.assert_allclose(found.position, 200.0 * np.array([1.0, -decay]) + difference)
+    np.testing.assert_allclose(found.denominator, node.denominator)
+    np.testing.assert_allclose(node.position[0], 200.0 + 60.0 * 24.0)
 
 
 def test_a_continuous_law_becomes_the_one_of_tustin(tmp_path):
