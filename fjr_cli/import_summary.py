@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -129,15 +130,15 @@ def _together(understood: Understood) -> Iterator[str]:
 
 
 def _controller(understood: Understood) -> str:
-    laws = {
-        "unknown"
-        if one.controller is None
-        else one.controller["kind"]
-        + (
-            f", unknown {', '.join(one.controller['unknown'])}"
-            if one.controller.get("unknown")
-            else ", all gains known"
-        )
-        for one in understood.descriptions
-    }
+    laws = {_law(one.controller) for one in understood.descriptions}
     return "; ".join(sorted(laws))
+
+
+def _law(controller: dict[str, Any] | None) -> str:
+    if controller is None:
+        return "unknown"
+    unknown = controller.get("unknown")
+    gains = f"unknown {', '.join(unknown)}" if unknown else "all gains known"
+    own_hz = {**controller, **controller.get("given", {})}.get("rate_hz")
+    rate = f", run at {own_hz:g} Hz" if own_hz else ""
+    return f"{controller['kind']}, {gains}{rate}"

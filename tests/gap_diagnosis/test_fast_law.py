@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from controller_node.law import law_of
+from fjr_cli.import_summary import _law
 from fjr_kit.errors import InputError
 from fjr_records.importers.import_map import parse_map
 from fjr_records.importers.importer import ImportOptions, import_files, read_files
@@ -60,8 +61,9 @@ def test_the_joint_is_found_under_a_law_that_ran_faster_than_its_log(tmp_path):
 
 def test_such_a_log_is_a_record_and_its_law_no_slower_than_it(tmp_path):
     files = logs(tmp_path)
-    (one, _) = read_files(files, options(tmp_path, ", rate_hz: 1000")).records
-    assert "runs faster than it is sampled" in str(one.repetition)
+    understood = read_files(files, options(tmp_path, ", rate_hz: 1000"))
+    assert "runs faster than it is sampled" in str(understood.records[0].repetition)
+    assert _law(dict(understood.descriptions[0].controller)).endswith("known, run at 1000 Hz")
     with pytest.raises(InputError, match=r"pd\.yaml: controller\.rate_hz is 50 Hz, but the sample"):
         read_files(files, options(tmp_path, ", rate_hz: 50"))
     with pytest.raises(InputError, match=r"controller\.between_samples: "):
