@@ -40,6 +40,7 @@ from .structures import (
     FeedForward,
     NodeLaw,
     structure_of,
+    unknown_names,
 )
 
 _LARGEST_FILE = 2**20
@@ -70,7 +71,7 @@ def describe(structure: AnyStructure, sample_rate_hz: float, source: str) -> dic
         InputError: the law is not causal or not stable; names `source`.
     """
     given = structure.model_dump(exclude_defaults=True)
-    unknown = _unknown(given)
+    unknown = unknown_names(given)
     if unknown:
         return {**_nulled(given), "unknown": unknown}
     law = structure.law(sample_rate_hz, f"{source}: controller")
@@ -97,22 +98,6 @@ def describe(structure: AnyStructure, sample_rate_hz: float, source: str) -> dic
 def _more(structure: NodeLaw) -> bool:
     """Tell whether a law of the controller node has what the node itself has not."""
     return structure.feed_forward != FeedForward() or structure.rate_hz is not None
-
-
-def _unknown(given: Any, prefix: str = "") -> list[str]:
-    """Return the dotted names of all values that are unknown."""
-    if given == UNKNOWN:
-        return [prefix]
-    inside: list[tuple[Any, Any]] = []
-    if isinstance(given, dict):
-        inside = list(given.items())
-    elif isinstance(given, list):
-        inside = list(enumerate(given))
-    return [
-        name
-        for key, value in inside
-        for name in _unknown(value, f"{prefix}.{key}" if prefix else str(key))
-    ]
 
 
 def _nulled(given: Any) -> Any:

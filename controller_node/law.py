@@ -59,7 +59,8 @@ def law_as_run(
         InputError: as `law_of`.
     """
     filled = with_gains(controller or {}, gains or {})
-    whole = {**filled, **(filled.get("given") or {})} if "given" in filled else filled
+    given = filled.get("given")
+    whole = {**filled, **given} if isinstance(given, Mapping) else filled
     if not whole.get("rate_hz"):
         return as_transfer_function(law_of(filled, sample_rate_hz))
     return structure_of(known_fields(whole), SOURCE).law_as_run(sample_rate_hz, SOURCE)

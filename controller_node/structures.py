@@ -27,7 +27,7 @@ ONE_DEGREE, TWO_DEGREES = "transfer_function", "two_degrees_of_freedom"
 _MOST_COEFFICIENTS = 128
 FASTEST_HZ = 1e5
 """Highest rate of a law."""
-_SAME_RATE = 1e-3
+_SAME_RATE, _MOST_STEPS = 1e-3, 1000
 
 
 def _no_truth(value: Any) -> Any:
@@ -90,11 +90,13 @@ class Structure(_Part):
         """Return C_r without feed-forward, and C_y; all gains must be numbers."""
 
     def law(self, sample_rate_hz: float, source: str) -> TransferFunction:
-        """Return the law at a rate; all gains must be numbers.
+        """Return the law at a rate.
 
         Raises:
-            InputError: it is not causal or not stable; names `source`.
+            InputError: a gain is unknown, or it is not causal or not stable; names `source`.
         """
+        if unknown := unknown_names(self.model_dump()):
+            raise InputError(f"{source}.{unknown[0]} is unknown; give its value.")
         period_s = 1.0 / sample_rate_hz
         limit = math.inf if self.torque_limit_nm is None else float(self.torque_limit_nm)
         with np.errstate(all="ignore"):
@@ -119,14 +121,39 @@ class Structure(_Part):
         return replace(law, steps=steps, joins=self.between_samples == "joined")
 
     def steps(self, sample_rate_hz: float, source: str) -> int:
-        """Return how often the law runs in one sample; raise InputError if it runs slower."""
+        """Return how often the law runs in one sample.
+
+        Raises:
+            InputError: it runs slower than the samples come, or so fast as no log calls for.
+        """
         rate_hz = sample_rate_hz if self.rate_hz is None else self.rate_hz
         if rate_hz < sample_rate_hz * (1.0 - _SAME_RATE):
             raise InputError(
                 f"{source}.rate_hz is {rate_hz:g} Hz, but the samples come at {sample_rate_hz:g} "
                 "Hz; a law that runs slower than its record cannot be played."
             )
+        if rate_hz > _MOST_STEPS * sample_rate_hz:
+            raise InputError(
+                f"{source}.rate_hz is {rate_hz:g} Hz, more than {_MOST_STEPS} times the "
+                f"{sample_rate_hz:g} Hz of the samples; sample faster, or correct it."
+            )
         return round(rate_hz / sample_rate_hz)
+
+
+def unknown_names(given: Any, prefix: str = "") -> list[str]:
+    """Return the dotted names of all values that are unknown."""
+    if given == UNKNOWN:
+        return [prefix]
+    inside: list[tuple[Any, Any]] = []
+    if isinstance(given, dict):
+        inside = list(given.items())
+    elif isinstance(given, list):
+        inside = list(enumerate(given))
+    return [
+        name
+        for key, value in inside
+        for name in unknown_names(value, f"{prefix}.{key}" if prefix else str(key))
+    ]
 
 
 def _causal(ratio: Ratio, source: str) -> Ratio:

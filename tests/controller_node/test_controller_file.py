@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 
 import numpy as np
@@ -12,7 +13,7 @@ from scipy.signal import lfilter
 
 from controller_node import pd_filtered
 from controller_node.controller_file import describe, read_controller
-from controller_node.law import as_transfer_function, law_of
+from controller_node.law import as_transfer_function, law_as_run, law_of
 from controller_node.structures import ONE_DEGREE, TWO_DEGREES
 from controller_node.transfer_function import TransferFunction
 from fjr_kit.errors import InputError
@@ -170,9 +171,13 @@ def test_whatever_the_file_holds_it_is_described_or_refused(tmp_path_factory, te
 @given(CONTENTS, st.sampled_from([None, "p", ["p"], ["p", "p"], ["numerator.0"], [3], ["q.1"]]))
 def test_whatever_a_bag_describes_it_is_a_law_or_refused(content, unknown):
     content = content if unknown is None else {**content, "unknown": unknown}
-    for gains in (None, {"p": 3.0}, {"numerator.0": 2.0}):
+    whole = {"kind": "pd", "p": 1.0, "given": {"rate_hz": 2000.0, **content}}
+    for made, gains in itertools.product(
+        (content, whole), (None, {"p": 3.0}, {"numerator.0": 2.0})
+    ):
         try:
-            as_transfer_function(law_of(content, RATE, gains))
+            as_transfer_function(law_of(made, RATE, gains))
+            law_as_run(made, RATE, gains)
         except InputError as refused:
             sentence = str(refused)
             assert sentence.startswith("experiment description: controller")

@@ -193,6 +193,9 @@ def test_a_law_is_known_by_what_was_given_and_may_run_no_slower_than_its_record(
     assert law_as_run(entry, 990.0).steps == 1
     with pytest.raises(InputError, match=r"rate_hz is 1000 Hz, but the samples come at 2000 Hz"):
         law_as_run(entry, 2000.0)
+    with pytest.raises(InputError, match=r"more than 1000 times the 0\.5 Hz of the samples"):
+        law_as_run(entry, 0.5)
+    assert law_as_run({**entry, "given": "nothing"}, 100.0).steps == 1
     gains = {"kind": "pd", "p": None, "d": 2.0, "unknown": ["p"], "rate_hz": 1000.0}
     assert law_as_run(gains, 100.0, {"p": 40.0}).position == pytest.approx(law.position)
 
