@@ -268,8 +268,8 @@ class Extension:
             before = next(fit for fit in reversed(steps) if effect not in fit.effects)
             came = next((fit for fit in steps if effect in fit.effects), parent)
             with_it = {*came.effects} - {*before.effects, effect}
-            lacked = any(fx.EFFECTS[e].of_bare_plant for e in with_it)
-            if not lacked and self._closes_nearly_all(parent, before):
+            with_lacked = any(fx.EFFECTS[e].of_bare_plant for e in with_it)
+            if not with_lacked and self._closes_nearly_all(parent, before):
                 named.append(effect)
         return partners(named, set(self.effects), self._fitter.nominal)
 

@@ -26,14 +26,6 @@ LAWS: Mapping[str, Callable[[np.ndarray], np.ndarray]] = {
 """Laws of friction whose torque at a velocity is proportional to their size."""
 LACKED = ("coulomb_friction", "viscous_friction")
 """Frictions that a datasheet of inertias lacks."""
-
-
-def lacked(plant: Mapping[str, float]) -> frozenset[str]:
-    """Return the frictions of `LACKED` that a datasheet has nowhere, by the names of PLANT."""
-    adds = {e: [fx.parameter(name).adds_to for name in fx.EFFECTS[e].names] for e in LACKED}
-    return frozenset(e for e, names in adds.items() if not any(plant.get(n or "") for n in names))
-
-
 _FALLING, _FALLS_AT = "stribeck_friction_motor.torque_nm", "stribeck_friction_motor.velocity_rad_s"
 _FALLEN = (0.01, 0.02, 0.04, 0.08, 0.16, 0.32)
 """Of the usual speed: where friction may have fallen from breakaway."""
@@ -195,6 +187,12 @@ class Seen:
             return None, left
         found = {name: size for name, size in zip(order, sizes, strict=False) if size}
         return heavier(self.model, inertia, {**found, **seed}), left
+
+
+def lacked(plant: Mapping[str, float]) -> frozenset[str]:
+    """Return the frictions of `LACKED` that a datasheet has nowhere, by the names of PLANT."""
+    adds = {e: [fx.parameter(name).adds_to for name in fx.EFFECTS[e].names] for e in LACKED}
+    return frozenset(e for e, names in adds.items() if not any(plant.get(n or "") for n in names))
 
 
 def load_torques(load: str, angle: np.ndarray) -> list[np.ndarray]:

@@ -64,7 +64,9 @@ class Stepwise:
         """Search forward from the fit of the base parameters alone."""
         found = self._onward(Found([refit]))
         other = self._from_both_frictions(found)
-        return other if other is not None and self._better(other, found) else found
+        if other is not None and self.extension.gain(other.best, found.best).present:
+            return other
+        return found
 
     def _from_both_frictions(self, found: Found) -> Found | None:
         """Search anew from the frictions that the datasheet lacks and every joint has.
@@ -84,9 +86,6 @@ class Stepwise:
             return None
         first = self.extension.ranked(begun, found.steps[0])[0]
         return self._onward(Found([found.steps[0], first], rivals={1: found.rivals[1]}))
-
-    def _better(self, other: Found, found: Found) -> bool:
-        return self.extension.gain(other.best, found.best).present
 
     def _onward(self, found: Found) -> Found:
         """Add to what was found, cause after cause."""

@@ -60,7 +60,7 @@ def test_a_search_that_ended_with_one_friction_begins_anew_from_both(fitter):
     assert both
     anew = search._from_both_frictions(Found([refit, one], rivals={1: fits}))
     assert anew is not None and {*anew.best.effects} == {*BOTH}
-    assert search._better(anew, Found([refit, one]))
+    assert search.extension.gain(anew.best, one).present
     sizes = anew.best.model.effects
     assert sizes["coulomb_friction.motor_nm"] == pytest.approx(COULOMB, rel=0.05)
     assert sizes["viscous_friction.motor_nm_s_rad"] == pytest.approx(VISCOUS, rel=0.05)
