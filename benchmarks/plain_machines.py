@@ -16,6 +16,10 @@ their friction scatters by 2 % from run to run, beside a torque that wanders.
 - `servo`: a hobby servo that logs position in 4096 steps and current in coarse counts, at 50 to
   200 Hz: a swept sine, sines, or moves of one speed; friction that falls from breakaway, half of
   them gravity, half of them friction under that load. Its law is not told.
+- `stage`: a table on a screw, in metres and newtons, that goes from place to place at several
+  speeds, logged at 1 kHz; friction of which half are unequal both ways, which a constant force
+  tells as well. Half of the second runs are the first ones with pushes added to the force. Half
+  of the laws, a position loop around a speed loop, are told.
 
 Counted are what is missed, what is named but is not there, the ratio of each size to the truth
 (of a swing, both over their inertia), and how many of the intervals hold it.
@@ -41,7 +45,7 @@ from gap_diagnosis import read_nominal
 from gap_diagnosis.any_record import diagnose
 from gap_diagnosis.outcome.diagnosis import Diagnosis
 
-BRISTLE_RAD, ACCELERATES_S, INNER_HZ, SMOOTHED = 0.003, 0.5, 8000.0, 0.3
+BRISTLE, ACCELERATES_S, INNER_HZ, SMOOTHED = 0.003, 0.5, 8000.0, 0.3
 SIZES = {
     "gravity.torque_nm": "gravity",
     "coulomb_friction.motor_nm": "coulomb",
@@ -50,6 +54,7 @@ SIZES = {
     "stribeck_friction_motor.torque_nm": "breakaway",
     "load_friction.coefficient": "of load",
     "delay.time_s": "delay",
+    "torque_bias.torque_nm": "bias",
 }
 
 
@@ -60,8 +65,9 @@ class Machine:
     Attributes:
         truth: inertia, and sizes by the names of `SIZES`.
         rate_hz: of the records.
-        runs: (columns, samples) of each: time, position or speed, torque or target.
-        position: unit of the second column.
+        runs: (columns, samples) of each; a position may be a speed.
+        columns: of each run.
+        position: unit of positions and references.
         swings: whether sizes show over the inertia only.
         law: file of the controller that made the torque, where targets were logged; or empty.
     """
@@ -69,6 +75,7 @@ class Machine:
     truth: dict[str, float]
     rate_hz: float
     runs: list[np.ndarray]
+    columns: tuple[str, ...] = ("time", "position", "torque")
     position: str = "1"
     swings: bool = False
     law: str = ""
@@ -78,11 +85,14 @@ class Machine:
         folder.mkdir()
         files = [folder / f"run_{number}.csv" for number in range(len(self.runs))]
         for file, run in zip(files, self.runs, strict=True):
-            np.savetxt(file, run.T, fmt="%.9g", delimiter=",", header="t,q,tau", comments="")
+            header = ",".join(self.columns)
+            np.savetxt(file, run.T, fmt="%.9g", delimiter=",", header=header, comments="")
         law = folder / "law.yaml"
         law.write_text(self.law)
-        third, laws = ("reference=tau:1", (law,)) if self.law else ("torque=tau:1", ())
-        columns = parse_map(["time=t", third, f"position=q:{self.position}"], described=bool(laws))
+        laws = (law,) if self.law else ()
+        given = [f"{name}={name}:{self.position if name in ('position', 'reference') else 1}"
+                 for name in self.columns[1:]]  # fmt: skip
+        columns = parse_map(["time=time", *given], described=bool(laws))
         import_files(files, folder / "bags", ImportOptions(columns=columns, controllers=laws))
         (folder / "nominal.yaml").write_text(f"{{jm: {told!r}, k0: .inf}}\n")
 
@@ -90,15 +100,15 @@ class Machine:
 @numba.njit  # type: ignore[untyped-decorator]
 def moved(
     wanted, gain, integral, damping, late, angle, inertia, gravity, coulomb, viscous, quadratic,
-    breakaway, fallen, of_load, pushed, step, rate_hz, inner,
+    breakaway, fallen, of_load, pushed, step, touch, rate_hz, often, inner,
 ):  # fmt: skip
     """Return position, mean torque and speed.
 
-    With damping it is wanted positions, with a gain alone speeds, else torques. The law runs twenty
-    times in a sample; its torque comes late by so many of its runs, its speed through a filter.
+    With damping it is wanted positions, with a gain alone speeds, else torques. The law runs so
+    often in a sample; its torque comes late by so many of its runs, its speed through a filter.
     """
     dt, speed, bristle, sum_, torque = 1.0 / (rate_hz * inner), 0.0, 0.0, 0.0, 0.0
-    every, found = max(inner // 20, 1), np.zeros((3, wanted.size))
+    every, found = inner // often, np.zeros((3, wanted.size))
     smooth, runs, waiting = 0.0, 0, np.zeros(late + 1)
     for k in range(wanted.size):
         found[0, k], found[2, k] = np.round(angle / step) * step, speed
@@ -119,9 +129,9 @@ def moved(
                 torque = waiting[runs % waiting.size]
             load = gravity * np.sin(angle)
             level = coulomb + breakaway * np.exp(-((speed / fallen) ** 2)) + of_load * abs(load)
-            ends = BRISTLE_RAD if speed >= 0.0 else -BRISTLE_RAD
-            bristle = ends + (bristle - ends) * np.exp(-abs(speed) * dt / BRISTLE_RAD)
-            lost = level * bristle / BRISTLE_RAD + viscous * speed + quadratic * abs(speed) * speed
+            ends = touch if speed >= 0.0 else -touch
+            bristle = ends + (bristle - ends) * np.exp(-abs(speed) * dt / touch)
+            lost = level * bristle / touch + viscous * speed + quadratic * abs(speed) * speed
             speed += dt * (torque + pushed[k] - lost - load) / inertia
             angle += dt * speed
             found[1, k] += torque / inner
@@ -131,17 +141,19 @@ def moved(
 def run_of(
     truth: dict[str, float], wanted: np.ndarray, rate_hz: float, rng: np.random.Generator,
     wanders: float, *, gain: float = 0.0, integral: float = 0.0, damping: float = 0.0,
-    angle: float = 0.0, fallen: float = 1.0, step: float = 1e-6,
+    angle: float = 0.0, fallen: float = 1.0, step: float = 1e-6, touch: float = BRISTLE,
+    pushed: np.ndarray | float = 0.0, often: int = 20,
 ) -> np.ndarray:  # fmt: skip
     """Return position, torque and speed of one run, (3, samples)."""
     share, size = 1.0 + 0.02 * rng.standard_normal(), truth.get
     inner = max(int(INNER_HZ / rate_hz), 20)
-    late = round(size("delay", 0.0) * rate_hz * inner / max(inner // 20, 1))
+    late = round(size("delay", 0.0) * rate_hz * inner / (inner // often))
     return moved(
         wanted, gain, integral, damping, late, angle, truth["inertia"], size("gravity", 0.0),
         share * truth["coulomb"], share * truth["viscous"], size("quadratic", 0.0),
         share * size("breakaway", 0.0), fallen, size("of load", 0.0),
-        wanders * truth["coulomb"] * wandering(rng, wanted.size, rate_hz), step, rate_hz, inner,
+        wanders * truth["coulomb"] * wandering(rng, wanted.size, rate_hz) + size("bias", 0.0)
+        + pushed, step, touch, rate_hz, often, inner,
     )  # fmt: skip
 
 
@@ -241,7 +253,8 @@ def leg(rng: np.random.Generator) -> Machine:
     ran_hz = 20.0 * rate
     filtered = -ran_hz * np.log(1.0 - SMOOTHED)
     law = f"kind: pd\np: {gain}\nd: {damping}\nn: {filtered}\nderivative_on: measurement\n"
-    return Machine(truth, rate, runs, law=f"{law}rate_hz: {ran_hz}\n")
+    columns = ("time", "position", "reference")
+    return Machine(truth, rate, runs, columns, law=f"{law}rate_hz: {ran_hz}\n")
 
 
 def servo(rng: np.random.Generator) -> Machine:
@@ -281,9 +294,50 @@ def servo(rng: np.random.Generator) -> Machine:
     return Machine(truth, rate, runs)
 
 
+def stage(rng: np.random.Generator) -> Machine:
+    """Draw a positioning table."""
+    rate, seconds, mass = 1000.0, float(rng.choice([12, 25])), 10.0 ** rng.uniform(0, 2.5)
+    natural = 2.0 * np.pi * rng.uniform(3, 10)
+    gain, damping = mass * natural**2, 2.0 * mass * natural
+    fastest, accelerates = rng.uniform(0.05, 0.3), rng.uniform(0.5, 3)
+    truth = {"inertia": mass, "coulomb": mass * accelerates * rng.uniform(0.1, 0.5)}
+    truth["viscous"] = truth["coulomb"] / fastest * rng.uniform(0.3, 2)
+    if rng.random() < 0.5:
+        truth["bias"] = truth["coulomb"] * rng.uniform(0.1, 0.3) * rng.choice([-1, 1])
+    stamps, runs = np.arange(int(rate * seconds)) / rate, []
+    target, place = np.zeros(stamps.size), 0
+    while place < stamps.size:
+        speed, length = fastest * rng.uniform(0.1, 1.0), fastest * rng.uniform(0.3, 1.0)
+        times = np.arange(int((length / speed + speed / accelerates + 0.2) * rate)) / rate
+        asked = np.minimum(accelerates * times, speed)
+        asked = np.minimum(asked, np.maximum(accelerates * (times[-1] - 0.2 - times), 0.0))
+        way = np.cumsum(asked) / rate * (1 if target[place - 1] <= 0.0 else -1)
+        end = min(place + way.size, stamps.size)
+        target[place:end] = target[place - 1] + way[: end - place]
+        place = end
+    pushes = np.zeros(stamps.size)
+    if rng.random() < 0.5:
+        for start in rng.integers(0, stamps.size - 300, 8):
+            pushes[start : start + 200] = (
+                mass * accelerates * rng.uniform(0.3, 1) * rng.choice([-1, 1])
+            )
+    for number in range(2):
+        found = run_of(
+            truth, target, rate, rng, 0.03, gain=gain, damping=damping, step=1e-6, touch=2e-5,
+            pushed=pushes * number, often=1,
+        )  # fmt: skip
+        force = found[1] + pushes * number
+        runs.append(np.array([stamps, found[0], force, target]))
+    law = f"kind: pd\np: {gain}\nd: {damping}\nn: {-rate * np.log(1.0 - SMOOTHED)}\n"
+    law += "derivative_on: measurement\n"
+    columns = ("time", "position", "torque", "reference")
+    return Machine(truth, rate, runs, columns, "m", law=law if rng.random() < 0.5 else "")
+
+
 ALSO = {"presliding_friction", "encoder_quantization"}  # in all of them
 KINDS: dict[str, Callable[[np.random.Generator], Machine]] = {
     "swing": swing, "stairs": stairs, "fan": fan, "leg": leg, "servo": servo,
+    "stage": stage,
 }  # fmt: skip
 
 

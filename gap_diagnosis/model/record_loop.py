@@ -25,7 +25,9 @@ from .controller_gains import identify_gains
 Loop = Literal["known", "gains_fitted", "unknown"]
 
 FOLLOWS = 0.98
-"""Share of the torque's variance that a controller must explain for its loop to be simulated."""
+"""Share of the torque's variance that a controller must explain to be the one that is described."""
+PARTLY = 0.8
+"""Likewise, for its loop to be simulated with the rest added to it: pushes in a test, say."""
 GROWS = 20.0
 """Relative change of the simulated motion over that of an inertia, above which the loop is erratic:
 of 16 random rigs of the blind check none exceeds 3.3, loops that swing had a hundred or more."""
@@ -92,17 +94,18 @@ def loop_of(records: RecordSet) -> RecordLoop:
             gains = {r.name: _solved([r], rate) for r in solved}
     laws = {r.name: _law(r, rate, gains.get(r.name, {})) for r in described}
     shares = {r.name: explained(laws[r.name], r) for r in described}
-    follow = [r.name for r in described if shares[r.name] >= FOLLOWS]
+    follow = [r.name for r in described if shares[r.name] >= PARTLY]
     notes += _gains_told({name: found for name, found in gains.items() if name in follow})
     if len(follow) < len(described):
         notes.append(_not_followed(shares, len(runs)))
-    added = {
-        r.name: _beside(laws[r.name], r, rate)
-        for r in described
-        if r.name in follow and shares[r.name] < EXACT
-    }
+    most = {r.name: r for r in described if FOLLOWS <= shares[r.name] < EXACT}
+    added = {name: _beside(laws[name], r, rate) for name, r in most.items()}
     if added:
         notes.append(_rest_told(min(shares[name] for name in added), list(added.values())))
+    pushed = {r.name: r for r in described if PARTLY <= shares[r.name] < FOLLOWS}
+    if pushed:
+        notes.append(_pushed_told({name: shares[name] for name in pushed}))
+    added |= {name: not_made(laws[name], r) for name, r in pushed.items()}
     kind: Loop = "unknown" if not follow else "gains_fitted" if gains else "known"
     chosen = tuple(laws[r.name] if r.name in follow else None for r in runs)
     beside = tuple(added.get(r.name) for r in runs)
@@ -123,7 +126,9 @@ def without_erratic(loop: RecordLoop, names: Sequence[str], growth: Sequence[flo
     erratic = [value > GROWS for value in growth]
     if not any(erratic):
         return loop
-    where = _runs_told([name for name, grows in zip(names, erratic, strict=True) if grows], loop)
+    where = _runs_told(
+        [name for name, grows in zip(names, erratic, strict=True) if grows], len(names)
+    )
     note = (
         f"By the datasheet the loop of {where} swings so that small differences grow "
         f"({max(growth):.2g} times), so there the recorded torque drives the model."
@@ -149,7 +154,7 @@ def without_swinging(loop: RecordLoop, records: RecordSet) -> RecordLoop:
     if not any(swings):
         return loop
     where = _runs_told(
-        [r.name for r, out in zip(records.records, swings, strict=True) if out], loop
+        [r.name for r, out in zip(records.records, swings, strict=True) if out], len(swings)
     )
     note = (
         f"The reference accounts for no more than {max(s for s in accounted if s < SWINGS):.0%} of "
@@ -198,10 +203,20 @@ def _rest_told(worst: float, added: Sequence[np.ndarray | None]) -> str:
     return f"The described controller makes {worst:.2%} of the recorded torque's variance; {what}."
 
 
-def _runs_told(names: Sequence[str], loop: RecordLoop) -> str:
+def _pushed_told(shares: Mapping[str, float]) -> str:
+    """Return the sentence on runs of whose torque the described controller makes the most only."""
+    return (
+        f"The described controller makes no more than {min(shares.values()):.1%} of the variance "
+        f"of the recorded torque of {_runs_told(list(shares), len(shares))}; the rest, such as "
+        "pushes in a test, is added to the loop as it was recorded. If there were none, check the "
+        "description, the signs, and whether the drive was on."
+    )
+
+
+def _runs_told(names: Sequence[str], runs: int) -> str:
     if len(names) <= _SHOWN:
         return ", ".join(names)
-    return f"{len(names)} of {len(loop.laws)} runs"
+    return f"{len(names)} of {runs} runs"
 
 
 def _unknown_in(loop: RecordLoop, out: Sequence[bool], note: str) -> RecordLoop:
@@ -231,7 +246,7 @@ def _gains_told(gains: Mapping[str, Mapping[str, float]]) -> list[str]:
 
 def _not_followed(shares: Mapping[str, float], runs: int) -> str:
     """Return the sentence on runs whose torque the described controller does not make."""
-    failed = [name for name, share in shares.items() if share < FOLLOWS]
+    failed = [name for name, share in shares.items() if share < PARTLY]
     worst = max(min(shares.values()), 0.0)
     which = "any run" if len(failed) == runs else ", ".join(failed)
     return (

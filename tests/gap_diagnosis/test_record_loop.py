@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from controller_node.law import law_of
+from controller_node.law import as_transfer_function, law_of
 from excitation_node import records as made_of
 from fjr_interface.experiment import RecordDescription
 from fjr_records.records import Record, RecordSet
@@ -122,3 +122,21 @@ def test_noise_of_a_torque_sensor_is_not_added_to_the_loop():
     loop = loop_of(RecordSet("test", RATE, runs))
     assert loop.kind == "known" and loop.added == (None, None)
     assert "as noise of a sensor does" in loop.notes[-1]
+
+
+def test_pushes_beside_the_law_are_added_to_the_loop():
+    """As where a test pushes a drive that its controller holds."""
+    plain, law = record(0, 300.0, None), {"kind": "pd", "p": 300.0, "d": 60.0, "n": 200.0}
+    pushes = np.zeros(plain.samples)
+    pushes[1000:1300], pushes[2500:2800] = 20.0, -20.0
+    described = plain.description.model_copy(update={"controller": law})
+    made = as_transfer_function(law_of(law, RATE))
+    run = closed_loop.simulate_law(
+        plain.reference, RATE, plant.coefficients(NOMINAL), made, added=pushes
+    )
+    pushed = replace(plain, description=described, torque=run.torque, position=run.position)
+    evidence = Evidence(RecordSet("test", RATE, (pushed,)), NOMINAL)
+    loop = evidence.simulator.loop
+    assert loop.kind == "known" and "such as pushes in a test" in loop.notes[-1]
+    played = evidence.simulator.run([Model.nominal(NOMINAL)], [0])[0][0]
+    assert np.abs(played[0] - run.position).max() < 1e-3 * np.abs(run.position).max()
