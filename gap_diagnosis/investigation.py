@@ -27,10 +27,10 @@ from .model.steady_runs import SteadyRuns
 from .outcome.diagnosis import Bags, Diagnosis
 from .outcome.verdict_words import LOST, OUT_OF_TIME, ROUNDING, SWINGS_FREE
 from .verdict.coarse_encoder import with_coarse_encoder
-from .verdict.judgement import PLAIN, judge
+from .verdict.judgement import judge, reproduced
 from .verdict.kept_causes import kept
 from .verdict.notes import at_limits, yielding
-from .verdict.tested_causes import Tested
+from .verdict.tested_causes import LEAST_PRESENT, Tested
 from .which.catalogue import catalogue
 from .which.cell_fits import DRIFT, CellFitter
 from .which.comparison import NOTHING_LEFT, CellFit
@@ -194,7 +194,7 @@ def investigate_runs(
     bags, scatter, said = _run_scatter(fitter, found.best)
     heard += said
     found, tested = kept(fitter, found, scatter, progress, names, until)
-    lost = _misses(fitter, found.best) >= 1.0 and not fitter.misfit(found.best) < PLAIN
+    lost = reproduced(fitter, found.best) < LEAST_PRESENT
     if (tested or not names) and lost:
         found, tested = replace(found, steps=found.steps[:1]), []
         heard.append(LOST)

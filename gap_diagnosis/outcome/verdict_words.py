@@ -19,9 +19,9 @@ SWINGS_FREE = (
 )
 
 LOST = (
-    "The best explanation still misses more than the whole motion, so it predicts nothing and none "
-    "of its causes is named: check the datasheet, the factor of the torque, and whether the runs "
-    "are sampled fast enough for the rig."
+    "The best explanation still misses half of the squared motion or more, so it predicts little "
+    "and none of its causes is named: check the datasheet, the factor of the torque, and whether "
+    "the runs are sampled fast enough for the rig."
 )
 _CUT = (
     "A gap remains after the refit, and the time budget ended the search for its cause. That is "

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+
 from ..gates.gate_checks import GateReport
 from ..how_far.ledger import Ledger
 from ..model.evidence import Evidence
@@ -125,6 +127,17 @@ def judge(
     )
 
 
+def reproduced(fitter: CellFitter, fit: CellFit) -> float:
+    """Return which share of the squared motion a fit reproduces where it is reported on.
+
+    What it leaves may hide anything, so that no cause of it is surer. It is 1 where noise explains
+    all that is left.
+    """
+    if fitter.misfit(fit) < PLAIN:
+        return 1.0
+    return max(1.0 - float(np.mean(Ledger(fitter.evidence).squares(fit.model))), 0.0)
+
+
 def _on_parameters(verdict: Verdict, best: CellFit, fitter: CellFitter) -> list[str]:
     """Return what must be said of base parameters that stand in updated.yaml."""
     said = [SCALED] if verdict == "parameters_only" else []
@@ -146,7 +159,7 @@ def _cause(
     return Cause(
         effect=tested.effect,
         others=alternatives.get(tested.effect, []),
-        present=tested.present,
+        present=min(tested.present, reproduced(fitter, found.best)),
         share=ledger.share(tested.without.model, found.best.model, found.steps[0].model),
         invariance_p=tested.invariance_p,
         where=ledger.places(moved),
