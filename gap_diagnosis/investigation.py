@@ -24,8 +24,9 @@ from .model.quasi_static import Stations
 from .model.record_length import within
 from .model.rig_model import Model
 from .model.steady_runs import SteadyRuns
+from .model.twist import doubt_of, goes_along
 from .outcome.diagnosis import Bags, Diagnosis
-from .outcome.verdict_words import LOST, OUT_OF_TIME, ROUNDING, SWINGS_FREE
+from .outcome.verdict_words import LOST, OUT_OF_TIME, ROUNDING, SWINGS_FREE, TWISTS
 from .verdict.coarse_encoder import with_coarse_encoder
 from .verdict.judgement import judge, reproduced
 from .verdict.kept_causes import kept
@@ -203,7 +204,7 @@ def investigate_runs(
     tied = {t.effect: _tied(fitter, found, t, names) for t in tested}
     alternatives = {effect: [fit.effects[-1] for fit in fits] for effect, fits in tied.items()}
     progress("judgement")
-    notes = [*records.notes, *cut, *heard, *_notes(evidence, found)]
+    notes = [*records.notes, *cut, *heard, *_notes(evidence, nominal, found)]
     diagnosis = judge(fitter, model, found, tested, alternatives, bags, scatter, notes)
     if order.effects is None or ROUNDING in order.effects:
         fitter, found, diagnosis = with_coarse_encoder(fitter, model, found, diagnosis)
@@ -266,7 +267,7 @@ def _tied(fitter: CellFitter, found: Found, tested: Tested, names: Sequence[str]
     return tied
 
 
-def _notes(evidence: Evidence, found: Found) -> list[str]:
+def _notes(evidence: Evidence, nominal: Mapping[str, float], found: Found) -> list[str]:
     if evidence.slow:
         return _notes_of_fit(found)
     loop, player = evidence.player.loop, evidence.player
@@ -276,6 +277,10 @@ def _notes(evidence: Evidence, found: Found) -> list[str]:
         notes += [f"{name}: {doubt}." for name, doubt in doubted if doubt is not None][:_SHOWN]
     if evidence.records.swings_free:
         notes.append(SWINGS_FREE)
+    if evidence.twist is not None:
+        notes.append(TWISTS)
+    elif ratio := goes_along(evidence.records, nominal, evidence.hop):
+        notes.append(doubt_of(ratio))
     step = evidence.noise.step_rad
     if step is not None and evidence.noise.std_rad <= 1.01 * step / math.sqrt(12.0):
         notes.append(

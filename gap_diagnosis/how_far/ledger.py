@@ -29,7 +29,10 @@ class Ledger:
         self._part = evidence.part_of(self.parts)
         energy = [self._energy(i) for i in range(len(evidence.records.records))]
         of_part = np.array([energy[part.record] for part in evidence.parts])
-        self._scale = of_part[self._part] * evidence.hop
+        of_motion = np.concatenate(
+            [np.tile(evidence.of_motion, evidence.windows(p)) for p in self.parts]
+        )
+        self._scale = np.where(of_motion, of_part[self._part] * evidence.hop, math.inf)
         self._floor = evidence.floor(self.parts)[evidence.cell_of(self.parts)]
 
     def _energy(self, index: int) -> float:
@@ -50,7 +53,7 @@ class Ledger:
                 return errors, runs
         evidence = self.evidence
         runs = evidence.simulator.run([model], self.runs)[0]
-        lines = {i: evidence.lines_of(run[0], i) for i, run in zip(self.runs, runs, strict=True)}
+        lines = {i: evidence.lines_of(run, i) for i, run in zip(self.runs, runs, strict=True)}
         cut = (evidence.parts[p] for p in self.parts)
         errors = np.concatenate([lines[part.record][part.windows].ravel() for part in cut])
         self._played.append((model, errors, runs))
@@ -145,13 +148,14 @@ class Ledger:
             if not sigma[cell] > 1.0:
                 continue
             level, band = divmod(cell, evidence.bands)
+            twist, band = divmod(band, len(evidence.edges) - 1)
             low, high = evidence.edges[band], evidence.edges[band + 1]
             found.append(
                 Place(
                     level=evidence.records.levels[level],
                     band_hz=(float(low * evidence.line_hz), float(high * evidence.line_hz)),
                     lines="slow" if band == 0 else "all",
-                    signal="torque" if evidence.slow else "position",
+                    signal="torque" if evidence.slow else "twist" if twist else "position",
                     sigma=float(sigma[cell]) if known else math.nan,
                 )
             )

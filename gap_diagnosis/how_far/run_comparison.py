@@ -71,8 +71,11 @@ def compare_runs(
     """
     errors = evidence.errors(list(models.values()), parts)
     yardstick = _yardstick(evidence, parts)
+    own = len(evidence.edges) - 1  # bands of the motion
     by_band = {
-        name: _root_ratio(evidence.mean_squares(each, parts), yardstick).reshape(-1, evidence.bands)
+        name: _root_ratio(evidence.mean_squares(each, parts), yardstick).reshape(
+            -1, evidence.bands
+        )[:, :own]
         for name, each in zip(models, errors, strict=True)
     }
     return [

@@ -1,8 +1,9 @@
 """Evidence of records: the error of a model in windows and lines, cell by cell and part by part.
 
-The error y_model - y is taken apart by the lapped transform (`lapped`). Its numbers stand in
-**cells**, one for each level and band: what noise and the remainder of the best model leave is
-alike within one, and is estimated there. They also stand in **parts**, blocks of windows of one
+The error y_model - y is taken apart by the lapped transform (`lapped`), and so is that of the twist
+where the link has an encoder (`twist`). Its numbers stand in **cells**, one for each level, signal
+and band: what noise and the remainder of the best model leave is alike within one, and is estimated
+there. They also stand in **parts**, blocks of windows of one
 record: some parts are for fitting, others for selecting, others for reporting.
 """
 
@@ -25,6 +26,7 @@ from .quasi_static import QuasiStaticSimulator, Stations
 from .record_rig import RecordSimulator
 from .rig_model import Model
 from .steady_runs import SteadyRuns
+from .twist import twist_of
 
 WINDOWS = 24
 """Windows into which the shortest record is cut, at least; twice as many where a level has a single
@@ -49,6 +51,7 @@ class Evidence:
         parts: blocks of windows; every window inside a record belongs to one.
         hop: half the length of a window, samples.
         lines: how many lines hold a signal, from line 0 on.
+        twist: of the transmission; None where it was not recorded.
         edges: (bands + 1,), first line of each band; band 0 is line 0, mean and slow motion.
     """
 
@@ -86,15 +89,28 @@ class Evidence:
             self.lines = self._lines_with_signal()
             top_hz = self.lines * self.line_hz
             self.simulator = RecordSimulator(records, self.noise, top_hz, nominal)
+        of_twist = records.twist_noise if isinstance(records, SteadyRuns) else None
+        self.twist = None if self.slow else twist_of(records, nominal, self.hop, run_in, of_twist)
+        self._recorded = [self._beside_twist(m, i) for i, m in enumerate(self._measured)]
         self.edges = _edges(self.lines)
         frequency = (np.arange(self.lines) + 0.5) * self.line_hz
-        self._held = [
+        held = [
             lapped(r.torque, self.hop)[:, : self.lines]
             / np.maximum(np.abs(self.simulator.response(frequency, i)), _least_held(r))
             for i, r in enumerate(records.records)
         ]
+        self._held = [self._beside_twist(lines, i) for i, lines in enumerate(held)]
         self.parts = tuple(cut(records, self.hop, run_in))
-        self._band = np.searchsorted(self.edges, np.arange(self.lines), side="right") - 1
+        bands = np.searchsorted(self.edges, np.arange(self.lines), side="right") - 1
+        own = len(self.edges) - 1
+        self._band = np.concatenate([bands + own * k for k in range(self.bands // own)])
+
+    def _beside_twist(self, lines: np.ndarray, index: int) -> np.ndarray:
+        """Return lines of a run, (windows, lines), and those of its recorded twist after them."""
+        own = lines[:, : self.lines]
+        if self.twist is None:
+            return own
+        return np.concatenate([own, self.twist.measured[index][:, : self.lines]], axis=1)
 
     def _lines_with_signal(self) -> int:
         """Return how many lines from line 0 on hold more than noise.
@@ -124,8 +140,13 @@ class Evidence:
 
     @property
     def bands(self) -> int:
-        """Number of bands."""
-        return len(self.edges) - 1
+        """Number of bands of all signals; those of the twist stand after those of the motion."""
+        return (len(self.edges) - 1) * (1 if self.twist is None else 2)
+
+    @property
+    def of_motion(self) -> np.ndarray:
+        """Which lines of a window are those of the motion, not of the twist, bool (lines,)."""
+        return self._band < len(self.edges) - 1
 
     @cached_property
     def cells(self) -> int:
@@ -140,10 +161,28 @@ class Evidence:
         if isinstance(self.records, SteadyRuns) and not self.noise.rounds:
             seen = self._scattered(self.player.scattered(self.records.scatter))
             if seen is not None:
-                return np.tile(seen, len(self.records.levels))
+                return self.power_beside_twist(seen)
+        return self.power_beside_twist(self._in_bands(self.noise))
+
+    def power_beside_twist(self, of_motion: np.ndarray) -> np.ndarray:
+        """Return the variance of an error in each cell, (cells,), rad2, from that of the motion.
+
+        Args:
+            of_motion: in each band, (bands,), of each level, (levels * bands,), or in all alike.
+        """
+        levels, own = len(self.records.levels), len(self.edges) - 1
+        in_bands = of_motion.reshape(-1, own) if of_motion.ndim else of_motion
+        found = np.broadcast_to(in_bands, (levels, own))
+        if self.twist is not None:
+            noise = self.twist.noise
+            power = self._in_bands(noise) if noise.known else np.zeros(own)
+            found = np.concatenate([found, np.tile(power, (levels, 1))], axis=1)
+        return found.ravel()
+
+    def _in_bands(self, noise: RecordNoise) -> np.ndarray:
+        """Return the variance of a noise in each band, (bands,), rad2."""
         cycles = 0.5 * (np.arange(self.lines) + 0.5) / self.hop
-        of_band = np.add.reduceat(self.noise.power(cycles), self.edges[:-1]) / np.diff(self.edges)
-        return np.tile(of_band, len(self.records.levels))
+        return np.add.reduceat(noise.power(cycles), self.edges[:-1]) / np.diff(self.edges)
 
     def _scattered(self, scatter: Sequence[np.ndarray]) -> np.ndarray | None:
         """Return the variance in each band by how errors differ between periods, (bands,).
@@ -205,21 +244,25 @@ class Evidence:
         spans, rows = spans_of(parts), []
         for runs in self.simulator.run(models, list(spans)):
             lines = {
-                index: self.lines_of(run[0], index, spans[index])
+                index: self.lines_of(run, index, spans[index])
                 for index, run in zip(spans, runs, strict=True)
             }
             rows.append(joined(lines, spans, parts))
         return np.array(rows)
 
-    def lines_of(
-        self, position: np.ndarray, index: int, windows: slice = slice(None)
-    ) -> np.ndarray:
-        """Return the lines of the error of a simulated position of one record, (windows, lines)."""
-        measured = self._measured[index][:, : self.lines]
+    def lines_of(self, run: np.ndarray, index: int, windows: slice = slice(None)) -> np.ndarray:
+        """Return the lines of the error of y, u and q, simulated, of one record, (windows, lines).
+
+        Those of the twist stand after those of the motion.
+        """
+        measured = self._recorded[index]
         most = _DIVERGED * np.abs(measured).max()
-        if not np.isfinite(position).all():
+        if not np.isfinite(run[0]).all():
             return np.full(measured[windows].shape, most)
-        lines = lapped(position[samples_of(windows, self.hop)], self.hop)[:, : self.lines]
+        lines = lapped(run[0][samples_of(windows, self.hop)], self.hop)[:, : self.lines]
+        if self.twist is not None:
+            twist = self.twist.lines_of(run, index)[windows, : self.lines]
+            lines = np.concatenate([lines, twist], axis=1)
         return np.clip(lines - measured[windows], -most, most)
 
     def measured(self, which: Sequence[int]) -> np.ndarray:
@@ -227,18 +270,16 @@ class Evidence:
 
         A torque is that motion which it makes against what holds the rig.
         """
-        return self._on_parts(self._held if self.slow else self._measured, which)
+        return self._on_parts(self._held if self.slow else self._recorded, which)
 
     def _on_parts(self, lines: Sequence[np.ndarray], which: Sequence[int]) -> np.ndarray:
-        pieces = [
-            lines[self.parts[i].record][self.parts[i].windows, : self.lines].ravel() for i in which
-        ]
+        pieces = [lines[self.parts[i].record][self.parts[i].windows].ravel() for i in which]
         return np.concatenate(pieces)
 
     def changes(
         self, positions: dict[int, np.ndarray], which: Sequence[int], every: int = 1
     ) -> np.ndarray:
-        """Return the lines of changes of y on parts, (errors,).
+        """Return the lines of changes of y on parts, (errors,); zeros for those of the twist.
 
         Args:
             positions: by the index of the record, the changes, means of each `every` samples.
@@ -252,6 +293,8 @@ class Evidence:
             index: scale * lapped(positions[index][samples_of(span, hop)], hop)[:, : self.lines]
             for index, span in spans.items()
         }
+        if self.twist is not None:
+            lines = {i: np.concatenate([own, 0.0 * own], axis=1) for i, own in lines.items()}
         return joined(lines, spans, parts)
 
     def cell_of(self, which: Sequence[int]) -> np.ndarray:
@@ -268,13 +311,13 @@ class Evidence:
 
     def part_of(self, which: Sequence[int]) -> np.ndarray:
         """Return the index of the part of each error, int (errors,)."""
-        return np.repeat(which, [self.windows(i) * self.lines for i in which])
+        return np.repeat(which, [self.windows(i) * self._band.size for i in which])
 
     def stretch_of(self, which: Sequence[int]) -> np.ndarray:
         """Return the index of the first of these parts in the stretch of each error, (errors,)."""
         first: dict[tuple[int, int], int] = {}
         begins = [first.setdefault((self.parts[i].record, self.parts[i].stretch), i) for i in which]
-        return np.repeat(begins, [self.windows(i) * self.lines for i in which])
+        return np.repeat(begins, [self.windows(i) * self._band.size for i in which])
 
     def windows(self, part: int) -> int:
         """Return the number of windows of a part."""
@@ -292,7 +335,7 @@ class Evidence:
             return np.full(self.cells, _SLIGHT**2 * np.mean(every**2) + 1e-30)
         moved, held = (
             self.mean_squares(self._on_parts(lines, which), which)
-            for lines in (self._measured, self._held)
+            for lines in (self._recorded, self._held)
         )
         return self.noise_power + _SIMULATION**2 * np.minimum(moved, held) + 1e-30
 

@@ -16,6 +16,8 @@ from fjr_records.periodic import RecordedExperiment, RecordedRealization
 from fjr_records.record_noise import RecordNoise, record_noise
 from fjr_records.records import Record, RecordSet
 
+from .twist import twist_noise
+
 LONGEST_S = 300.0
 """Of all mean periods together; of more, some realizations of each level are compared."""
 LEAST_OF_LEVEL = 3
@@ -33,12 +35,14 @@ class SteadyRuns(RecordSet):
         scatter: of each run, what differs between its periods, times what makes of that one draw of
             the noise of their mean, float64 (2, differences, N): of position in rad, of torque in
             N m; no differences for one period.
+        twist_noise: of the twist of the transmission; None without encoders of the link.
     """
 
     run_in: int = 0
     noise: RecordNoise | None = None
     top_hz: float = math.inf
     scatter: tuple[np.ndarray, ...] = ()
+    twist_noise: RecordNoise | None = None
 
 
 def steady_runs(recorded: RecordedExperiment) -> SteadyRuns:
@@ -57,6 +61,9 @@ def steady_runs(recorded: RecordedExperiment) -> SteadyRuns:
         )
     run_in = max(description.transient_periods, 1) * description.samples_per_period
     scatter = tuple(_scatter(recorded.realizations[i]) for i in chosen)
+    twisted = None
+    if all(record.link is not None for record in whole.records):
+        twisted = _of_mean(twist_noise(whole), description.periods)
     top_hz = max(description.excited_harmonics) * description.base_frequency_hz
     return SteadyRuns(
         recorded.source,
@@ -67,6 +74,7 @@ def steady_runs(recorded: RecordedExperiment) -> SteadyRuns:
         mean,
         top_hz,
         scatter,
+        twisted,
     )
 
 

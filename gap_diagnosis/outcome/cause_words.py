@@ -80,7 +80,8 @@ def place_words(place: Place) -> str:
     sigma = (
         f" ({two_digits(place.sigma)} \N{GREEK SMALL LETTER SIGMA})" if known(place.sigma) else ""
     )
-    return f"level {place.level}, {band}{kind}{sigma}"
+    twist = " of the twist" if place.signal == "twist" else ""
+    return f"level {place.level}, {band}{twist}{kind}{sigma}"
 
 
 def cause_name(cause: Cause) -> str:

@@ -131,7 +131,7 @@ class Place(ResultModel):
     level: int
     band_hz: Annotated[tuple[float, float], Unit("Hz")]
     lines: LineKind
-    signal: Literal["position", "torque"]
+    signal: Literal["position", "torque", "twist"]
     sigma: Number
 
 

@@ -23,6 +23,10 @@ LOST = (
     "and none of its causes is named: check the datasheet, the factor of the torque, and whether "
     "the runs are sampled fast enough for the rig."
 )
+TWISTS = (
+    "The link has an encoder, so the twist of the transmission is compared beside the motion, less "
+    "what two encoders differ by: zero, scale, and time between their samples."
+)
 _CUT = (
     "A gap remains after the refit, and the time budget ended the search for its cause. That is "
     "no proof that no effect of the catalogue explains it: give a greater --budget, or --effects."

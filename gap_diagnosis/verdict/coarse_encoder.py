@@ -101,7 +101,7 @@ def with_coarse_encoder(
 
 def _by_noise_alone(evidence: Evidence) -> Evidence:
     """Return the same runs as if nothing were rounded, beside the noise that is seen."""
-    seen = np.full(evidence.cells, evidence.noise.seen_rad**2)
+    seen = evidence.power_beside_twist(np.array(evidence.noise.seen_rad**2))
     return evidence.played_by(evidence.player.adding(None), seen)
 
 

@@ -75,6 +75,7 @@ def kept(
     lacking = lacked(fitter.nominal)
     replaced: set[str] = set()
     bearing: set[str] = set()
+    doubted: dict[str, float] = {}
 
     def tests_of(fit: CellFit) -> list[Tested]:
         progress(f"tests of {' + '.join(fit.effects)}")
@@ -108,11 +109,24 @@ def kept(
         if (guessed or nearly) and _bears(tested, tests):
             bearing.add(weakest.effect)
             continue
+        if guessed and weakest.passed:
+            doubted[weakest.effect] = weakest.present
         notes += [*_changing(weakest), *_kin(weakest), *_bent(weakest)]
         steps, tested = fewer, tests
+    notes += _unsure({e: p for e, p in doubted.items() if e not in steps[-1].effects})
     if tested and any(len(fit.effects) != count for count, fit in enumerate(steps)):
         steps = [steps[0], *_one_by_one(fitter, steps[-1], tested)]
     return replace(found, steps=steps, notes=tuple(notes)), _bearing(tested)
+
+
+def _unsure(doubted: Mapping[str, float]) -> list[str]:
+    """Return the sentence on causes that passed all tests, but not surely enough for a third."""
+    if not doubted:
+        return []
+    shown = ", ".join(f"{explanation([effect])} ({p:.0%})" for effect, p in doubted.items())
+    return [
+        f"What may be there as well, but is not sure enough to be named beside two others: {shown}."
+    ]
 
 
 def _without(names: set[str], tested: Sequence[Tested]) -> list[Tested]:

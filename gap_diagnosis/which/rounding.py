@@ -47,7 +47,8 @@ class Rounded:
 
     Attributes:
         added: on the average, to y, u and q of each run, float64 (3, samples).
-        power: mean square of how far y scatters about that average, by cells, (cells,), rad2.
+        power: mean square of how far y scatters about that average, in the bands of the
+            motion of each level, (levels * bands,), rad2.
     """
 
     added: Sequence[np.ndarray]
@@ -162,7 +163,8 @@ def _evidence(evidence: Evidence, rounded: Rounded) -> Evidence:
     seen = evidence.noise.seen_rad
     white = evidence.noise.std_rad**2  # at the least, where no noise beside it is seen
     power = np.maximum(rounded.power, white) if math.isnan(seen) else rounded.power + seen**2
-    return evidence.played_by(evidence.player.adding(rounded.added), power)
+    player = evidence.player.adding(rounded.added)
+    return evidence.played_by(player, evidence.power_beside_twist(power))
 
 
 def _squares(fitter: CellFitter, fit: CellFit) -> np.ndarray:

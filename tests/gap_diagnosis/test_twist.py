@@ -1,0 +1,123 @@
+"""A link with an encoder: the twist of the transmission is compared beside the motion."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.signal import chirp
+
+from fjr_interface.experiment import RecordDescription
+from fjr_records.records import Record, RecordSet
+from gap_diagnosis.any_record import investigate
+from gap_diagnosis.model.evidence import Evidence
+from gap_diagnosis.model.nominal import datasheet
+from gap_diagnosis.model.rig_model import Model
+from gap_diagnosis.outcome.verdict_words import TWISTS
+
+RATE, STEPS = 500.0, 40
+TRUE = {"jm": 0.02, "j": 0.03, "k0": 180.0}
+NOMINAL = datasheet({"jm": 0.021, "j": 0.028, "k0": 195.0, "fvm": 0.05, "fv": 0.05}, "test")
+DAMPING = 0.04  # of the transmission, N m s/rad
+
+
+def moved(torque: np.ndarray, gap: float, damping: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return motor and link angle of two masses with play between them, integrated here."""
+    h, q1, w1, q2, w2, rows = 1.0 / (RATE * STEPS), 0.0, 0.0, 0.0, 0.0, []
+    for drives in torque:
+        rows.append((q1, q2))
+        for _ in range(STEPS):
+            twist = q1 - q2
+            taut = math.copysign(max(abs(twist) - gap, 0.0), twist)
+            between = TRUE["k0"] * taut + (damping * (w1 - w2) if taut else 0.0)
+            w1 += h * (drives - between - 0.05 * w1) / TRUE["jm"]
+            w2 += h * (between - 0.05 * w2) / TRUE["j"]
+            q1 += h * w1
+            q2 += h * w2
+    motor, link = np.array(rows).T
+    return motor, link
+
+
+def recorded(
+    gap: float, *, scale: float = 1.0, zero: float = 0.0, late_s: float = 0.0
+) -> RecordSet:
+    """Return two runs whose link's encoder has a zero, a scale and a lateness of its own."""
+    records, rng = [], np.random.default_rng(3)
+    time = np.arange(4000) / RATE
+    for number in range(2):
+        torque = chirp(time, 0.5 + 0.3 * number, time[-1], 25.0 - 5.0 * number)
+        motor, link = moved(torque, gap, DAMPING)
+        link = zero + scale * np.interp(time - late_s, time, link)
+        noise = 1e-6 * rng.standard_normal((2, time.size))
+        described = RecordDescription.of(
+            "test", sample_rate_hz=RATE, level=0, levels=1, realization=number, realizations=2
+        )
+        records.append(
+            Record(f"run_{number}", described, None, torque, motor + noise[0], link + noise[1])
+        )
+    return RecordSet("test", RATE, tuple(records))
+
+
+@pytest.fixture(scope="module")
+def plain() -> RecordSet:
+    return recorded(0.0)
+
+
+@given(zero=st.floats(-3.0, 3.0), scale=st.floats(-2e-2, 2e-2), late_s=st.floats(-5e-3, 5e-3))
+def test_what_two_encoders_differ_by_is_not_compared(plain, zero, scale, late_s):
+    """Zero, scale and lateness of the link's encoder change no line of the twist's error."""
+
+    def other(r: Record) -> Record:
+        speed = np.gradient(r.position) * RATE
+        return replace(r, link=r.link + zero + scale * r.position - late_s * speed)
+
+    shifted = replace(plain, records=tuple(map(other, plain.records)))
+    one, two = (Evidence(each, NOMINAL) for each in (plain, shifted))
+    size = np.abs(one.twist.measured[0]).max()
+    for before, after in zip(one.twist.measured, two.twist.measured, strict=True):
+        assert np.abs(after - before).max() < 1e-6 * size
+
+
+def test_cells_of_the_twist_stand_after_those_of_the_motion(plain):
+    both, bare = (
+        Evidence(each, NOMINAL)
+        for each in (
+            plain, replace(plain, records=tuple(replace(r, link=None) for r in plain.records))
+        )
+    )  # fmt: skip
+    assert bare.twist is None and both.bands == 2 * bare.bands
+    assert both.of_motion.sum() == bare.lines
+    which = both.parts_for("fit")
+    model = Model.nominal(NOMINAL)
+    errors, alone = (e.errors([model], which)[0] for e in (both, bare))
+    of_motion = np.concatenate([np.tile(both.of_motion, both.windows(p)) for p in which])
+    assert np.array_equal(errors[of_motion], alone)
+    own = bare.bands
+    assert np.array_equal(both.floor(which)[:own], bare.floor(which))
+    assert (both.noise_power[own:] > 0.0).all()
+
+
+def test_a_link_of_the_other_sign_is_not_used_and_this_is_said(plain):
+    turned = replace(plain, records=tuple(replace(r, link=-r.link) for r in plain.records))
+    assert Evidence(turned, NOMINAL).twist is None
+    found = investigate(turned, NOMINAL, effects=["delay"]).diagnosis
+    assert any("-1.1 times as far" in note or "-1 times as far" in note for note in found.notes)
+
+
+def test_stiffness_play_and_damping_are_seen_in_the_twist():
+    """With a link encoder that is late, off in zero and scale; both inertias within two percent."""
+    effects = ["backlash", "piecewise_stiffness", "transmission_damping", "viscous_friction",
+               "hysteresis", "delay"]  # fmt: skip
+    runs = recorded(2e-3, scale=1.001, zero=0.02, late_s=1e-3)
+    found = investigate(runs, NOMINAL, effects=effects).diagnosis
+    assert TWISTS in found.notes
+    assert {"backlash", "transmission_damping"} <= set(found.effects)
+    assert set(found.effects) <= {"backlash", "transmission_damping", "viscous_friction"}
+    sizes = found.parameters
+    for name, true in TRUE.items():
+        assert sizes[name].value == pytest.approx(true, rel=0.02), name
+    assert sizes["backlash.half_gap_rad"].value == pytest.approx(2e-3, rel=0.1)
