@@ -25,6 +25,7 @@ from .screening import LARGEST, LARGEST_OF_TORQUES, Proposal, Screening, as_they
 from .search_space import Space, space_for, starts
 from .seen_together import LOADS, lacked
 from .seen_torques import FRICTIONS, SeenTorques
+from .seen_twist import PLAYS, play
 
 STICKING = ("coulomb_friction", "presliding_friction")
 """Friction, and the bristles by which it yields before it slides."""
@@ -60,17 +61,24 @@ class CellFitter(ReweightedFits):
         elif effect == DRIFT:
             seen = self._drifts()
         seeds = [*starts(effect, self.scales, cycles, self.nominal), *seen]
-        return self.screening_of(parent, seeds, self._frictions(parent, effect, seeds))
+        return self.screening_of(parent, seeds, self._seen(parent, effect, seeds))
 
-    def _frictions(
+    def _seen(
         self, parent: CellFit, effect: str, seeds: Sequence[Mapping[str, float]]
     ) -> list[tuple[Space, np.ndarray]]:
-        """Return points at which a law of friction explains what is seen along the motion."""
-        if effect not in FRICTIONS or self.evidence.slow:
+        """Return points at which a law explains what is seen of it, all else solved with it.
+
+        Friction is seen in the torque that the fit lacks along the motion, play in the twist.
+        """
+        models: list[Model] = []
+        if effect in FRICTIONS and not self.evidence.slow:
+            models = self._ripples(parent)[1].friction(effect)
+        elif effect in PLAYS and self.evidence.twist is not None:
+            models = play(self.evidence, self.fit_parts, parent.model, effect)
+        if not models:
             return []
         space = self._space(parent, seeds[0])
-        points = [space.point(model) for model in self._ripples(parent)[1].friction(effect)]
-        return [(space, np.clip(point, *space.bounds())) for point in points]
+        return [(space, np.clip(space.point(model), *space.bounds())) for model in models]
 
     def _drifts(self) -> list[dict[str, float]]:
         """Return starts of a drift of friction over all runs."""

@@ -18,6 +18,7 @@ from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.model.nominal import datasheet
 from gap_diagnosis.model.rig_model import Model
 from gap_diagnosis.outcome.verdict_words import TWISTS
+from gap_diagnosis.which.seen_twist import play
 
 RATE, STEPS = 500.0, 40
 TRUE = {"jm": 0.02, "j": 0.03, "k0": 180.0}
@@ -106,6 +107,16 @@ def test_a_link_of_the_other_sign_is_not_used_and_this_is_said(plain):
     assert Evidence(turned, NOMINAL).twist is None
     found = investigate(turned, NOMINAL, effects=["delay"]).diagnosis
     assert any("-1.1 times as far" in note or "-1 times as far" in note for note in found.notes)
+
+
+@pytest.mark.parametrize("effect", ["backlash", "piecewise_stiffness"])
+def test_play_and_stiffness_are_read_off_the_twist(effect):
+    """By least squares, beside a datasheet whose spring is 8 % too stiff."""
+    evidence = Evidence(recorded(2e-3, scale=1.001, zero=0.02), NOMINAL)
+    (seen,) = play(evidence, evidence.parts_for("fit"), Model.nominal(NOMINAL), effect)
+    assert next(iter(seen.effects.values())) == pytest.approx(2e-3, rel=0.15)
+    assert seen.plant["k0"] == pytest.approx(TRUE["k0"], rel=0.05)
+    assert seen.plant["jm"] == pytest.approx(TRUE["jm"], rel=0.05)
 
 
 def test_stiffness_play_and_damping_are_seen_in_the_twist():
