@@ -12,8 +12,10 @@ from hypothesis import strategies as st
 from scipy.signal import chirp
 
 from fjr_interface.experiment import RecordDescription
+from fjr_records.importers.import_map import parse_map
+from fjr_records.importers.importer import ImportOptions, import_files
 from fjr_records.records import Record, RecordSet
-from gap_diagnosis.any_record import investigate
+from gap_diagnosis.any_record import investigate, read_any
 from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.model.nominal import datasheet
 from gap_diagnosis.model.rig_model import Model
@@ -132,3 +134,30 @@ def test_stiffness_play_and_damping_are_seen_in_the_twist():
     for name, true in TRUE.items():
         assert sizes[name].value == pytest.approx(true, rel=0.02), name
     assert sizes["backlash.half_gap_rad"].value == pytest.approx(2e-3, rel=0.1)
+
+
+def test_the_twist_of_steady_periods_is_compared_as_well(tmp_path):
+    """Five periods after one; noise of the twist is that of the mean of the five."""
+    rng, files, samples = np.random.default_rng(5), [], 2000
+    for number in range(3):
+        lines = np.zeros(samples // 2 + 1, complex)
+        lines[2:140] = np.exp(2j * np.pi * rng.random(138))
+        period = np.fft.irfft(lines, samples)
+        torque = np.tile(period / period.std(), 6)
+        ends = np.array(moved(torque, 2e-3, DAMPING)) + 1e-6 * rng.standard_normal((2, torque.size))
+        table = np.column_stack([np.arange(torque.size) / RATE, torque, torque, *ends])
+        files.append(tmp_path / f"run_{number}.csv")
+        header = "time,reference,torque,position,link"
+        np.savetxt(files[-1], table, delimiter=",", header=header, comments="")
+    columns = [f"{name}={name}:1" for name in ("reference", "torque", "position", "link")]
+    import_files(files, tmp_path / "bags", ImportOptions(parse_map(["time=time", *columns])))
+    effects = ["backlash", "transmission_damping", "viscous_friction", "delay"]
+    found = investigate(read_any(tmp_path / "bags"), NOMINAL, effects=effects)
+    diagnosis, evidence = found.diagnosis, found.fitted.evidence
+    assert diagnosis.evidence.excitation == "periodic" and TWISTS in diagnosis.notes
+    assert evidence.twist.noise.std_rad == pytest.approx(1e-6 * math.sqrt(2.0 / 5.0), rel=0.2)
+    assert set(diagnosis.effects) == {"backlash", "transmission_damping"}
+    for name, true in TRUE.items():
+        assert diagnosis.parameters[name].value == pytest.approx(true, rel=0.01), name
+    gap = diagnosis.parameters["backlash.half_gap_rad"]
+    assert gap.value == pytest.approx(2e-3, rel=0.03) and gap.low < 2e-3 < gap.high
