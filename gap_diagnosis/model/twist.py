@@ -2,9 +2,10 @@
 
 Friction moves motor and link alike, what the transmission does stands between them: how soft it is,
 its play, its errors. So q - y is compared beside the motion y. Two encoders also differ in their
-zero, in their scale (a gear ratio that was rounded) and by the time between their samples: in 1, y
-and dy/dt. These are taken out of the recorded and of the simulated twist, by the recorded motion
-and least squares; a twist that goes with them is not seen.
+zero, in their scale (a gear ratio that was rounded) and by the time between their samples: in 1, q
+and dq/dt. These are taken out of the recorded and of the simulated twist, by the recorded motion of
+the link and least squares; a twist that goes with them is not seen. The motor's would not do: near
+resonance the twist itself comes late, which looks like damping.
 """
 
 from __future__ import annotations
@@ -78,7 +79,7 @@ def twist_of(
     if ratio is None or doubt_of(ratio):
         return None
     rate = records.sample_rate_hz
-    bases = tuple(_taken_out(r.position[run_in:], rate) for r in records.records)
+    bases = tuple(_taken_out(np.asarray(r.link)[run_in:], rate) for r in records.records)
     twists = [_twist(r) for r in records.records]
     lines = [_lines(t, basis, run_in, hop) for t, basis in zip(twists, bases, strict=True)]
     return Twist(hop, run_in, bases, tuple(lines), noise or twist_noise(records))
@@ -141,9 +142,9 @@ def _twist(record: Record) -> np.ndarray:
     return record.link - record.position
 
 
-def _taken_out(position: np.ndarray, sample_rate_hz: float) -> np.ndarray:
-    moved = np.column_stack([position, np.gradient(position) * sample_rate_hz])
-    return np.linalg.qr(np.column_stack([np.ones(position.size), moved]))[0]
+def _taken_out(link: np.ndarray, sample_rate_hz: float) -> np.ndarray:
+    moved = np.column_stack([link, np.gradient(link) * sample_rate_hz])
+    return np.linalg.qr(np.column_stack([np.ones(link.size), moved]))[0]
 
 
 def _lines(twist: np.ndarray, basis: np.ndarray, run_in: int, hop: int) -> np.ndarray:

@@ -74,7 +74,8 @@ class CellFitter(ReweightedFits):
         if effect in FRICTIONS and not self.evidence.slow:
             models = self._ripples(parent)[1].friction(effect)
         elif effect in PLAYS and self.evidence.twist is not None:
-            models = play(self.evidence, self.fit_parts, parent.model, effect)
+            bare = Model.nominal(self.nominal)
+            models = play(self.evidence, self.fit_parts, parent.model, effect, bare)
         if not models:
             return []
         space = self._space(parent, seeds[0])
