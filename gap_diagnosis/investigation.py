@@ -213,8 +213,26 @@ def investigate_runs(
 
 
 def _searched(timing: Timing, names: Sequence[str], progress: Progress, until: float) -> Found:
-    misses = partial(_misses, timing.fitter, parts=timing.fitter.select_parts)
-    return Stepwise(timing.fitter, names, progress, until, misses).run(timing.refit)
+    """Search from the refit; where a twist is known, from what the motion alone has shown.
+
+    What a transmission lacks is most of the twist's error, beside which friction and load, that
+    move both its ends, would hardly show.
+    """
+    fitter, begun = timing.fitter, Found([timing.refit])
+    if fitter.evidence.twist is not None:
+        alone = CellFitter(fitter.evidence.of_motion_alone(), fitter.nominal, fitter.tolerance)
+        shown = _stepwise(alone, names, progress, until).run(alone.refit())
+        progress("the twist of the transmission")
+        steps = [timing.refit, *(fitter.taken_over(fit) for fit in shown.steps[1:])]
+        begun = replace(shown, steps=steps, rivals={})
+    return _stepwise(fitter, names, progress, until).go_on(begun)
+
+
+def _stepwise(
+    fitter: CellFitter, names: Sequence[str], progress: Progress, until: float
+) -> Stepwise:
+    misses = partial(_misses, fitter, parts=fitter.select_parts)
+    return Stepwise(fitter, names, progress, until, misses)
 
 
 def _misses(fitter: CellFitter, fit: CellFit, parts: Sequence[int] | None = None) -> float:

@@ -218,6 +218,18 @@ class Evidence:
         other.simulator, other.noise_power = simulator, noise_power
         return other
 
+    def of_motion_alone(self) -> Evidence:
+        """Return the same records, compared by their motion and not by their twist."""
+        other = copy.copy(self)
+        other._recorded, other._held = (
+            [lines[:, self.of_motion] for lines in signals]
+            for signals in (self._recorded, self._held)
+        )
+        other._band, other.twist = self._band[self.of_motion], None
+        for known in ("cells", "noise_power"):
+            other.__dict__.pop(known, None)
+        return other
+
     def parts_for(self, *purposes: Purpose) -> tuple[int, ...]:
         """Return the indices of the parts for some purposes."""
         return tuple(i for i, part in enumerate(self.parts) if part.purpose in purposes)

@@ -62,7 +62,11 @@ class Stepwise:
 
     def run(self, refit: CellFit) -> Found:
         """Search forward from the fit of the base parameters alone."""
-        found = self._onward(Found([refit]))
+        return self.go_on(Found([refit]))
+
+    def go_on(self, begun: Found) -> Found:
+        """Search forward from what was found already."""
+        found = self._onward(begun)
         other = self._from_both_frictions(found)
         if other is not None and self.extension.gain(other.best, found.best).present:
             return other
