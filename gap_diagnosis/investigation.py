@@ -38,7 +38,7 @@ from .which.comparison import NOTHING_LEFT, CellFit
 from .which.equivalents import founded, partners
 from .which.estimates import moved_by_scatter, relative_scatter
 from .which.found import Found
-from .which.gains import stands_for
+from .which.gains import gain, stands_for
 from .which.rounding import beside_rounding
 from .which.search_space import TOLERANCE
 from .which.stepwise import Stepwise
@@ -213,19 +213,24 @@ def investigate_runs(
 
 
 def _searched(timing: Timing, names: Sequence[str], progress: Progress, until: float) -> Found:
-    """Search from the refit; where a twist is known, from what the motion alone has shown.
+    """Search from the refit; where a twist is known, also from what the motion alone has shown.
 
-    What a transmission lacks is most of the twist's error, beside which friction and load, that
-    move both its ends, would hardly show.
+    What a transmission lacks may be most of the twist's error, beside which friction and load, that
+    move both its ends, hardly show. What ends better counts, if that repeats on unseen parts.
     """
-    fitter, begun = timing.fitter, Found([timing.refit])
-    if fitter.evidence.twist is not None:
-        alone = CellFitter(fitter.evidence.of_motion_alone(), fitter.nominal, fitter.tolerance)
-        shown = _stepwise(alone, names, progress, until).run(alone.refit())
-        progress("the twist of the transmission")
-        steps = [timing.refit, *(fitter.taken_over(fit) for fit in shown.steps[1:])]
-        begun = replace(shown, steps=steps, rivals={})
-    return _stepwise(fitter, names, progress, until).go_on(begun)
+    fitter = timing.fitter
+    found = _stepwise(fitter, names, progress, until).run(timing.refit)
+    seen = fitter.evidence.twist is not None and time.monotonic() < until
+    if not seen or fitter.left_in_a_band(found.best) < NOTHING_LEFT:
+        return found
+    progress("by the motion alone")
+    alone = CellFitter(fitter.evidence.of_motion_alone(), fitter.nominal, fitter.tolerance)
+    shown = _stepwise(alone, names, progress, until).run(alone.refit())
+    progress("and then by the twist")
+    steps = [timing.refit, *(fitter.taken_over(fit) for fit in shown.steps[1:])]
+    begun = replace(shown, steps=steps, rivals={})
+    other = _stepwise(fitter, names, progress, until).go_on(begun)
+    return other if gain(fitter, other.best, found.best).present else found
 
 
 def _stepwise(
