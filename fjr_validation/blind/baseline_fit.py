@@ -50,7 +50,7 @@ class Problem:
     Attributes:
         budget_s: processor time for all of it.
         nominal: nominal bare parameters; those of one body on a rigid axis.
-        evidence: the runs, cut and divided.
+        evidence: the runs, cut and divided; the methods of others are fitted to motion alone.
         scales: what is usual in the record.
         fitted: names of the bare parameters that a refit may change; what the datasheet puts at
             zero stays there.
@@ -65,7 +65,7 @@ class Problem:
         recorded = read_any(folder)
         self._periodic = isinstance(recorded, RecordedExperiment)
         records = recorded.as_records() if isinstance(recorded, RecordedExperiment) else recorded
-        self.evidence = Evidence(records, nominal)
+        self.evidence = Evidence(records, nominal).of_motion_alone()
         self.scales = Scales.of_record(
             [r.position for r in records.records],
             [r.torque for r in records.records],
@@ -142,7 +142,7 @@ class Problem:
         for i in evidence.reporting:
             part = evidence.parts[i]
             motion = evidence.records.records[part.record].position
-            error = evidence.lines_of(positions[part.record], part.record)[part.windows]
+            error = evidence.lines_of(positions[part.record][None], part.record)[part.windows]
             power = np.sum(error**2) / (evidence.windows(i) * evidence.hop)
             shares.append(power / max(float(np.var(motion)), 1e-300))
         return Gap(

@@ -263,9 +263,14 @@ class Evidence:
         return np.array(rows)
 
     def lines_of(self, run: np.ndarray, index: int, windows: slice = slice(None)) -> np.ndarray:
-        """Return the lines of the error of y, u and q, simulated, of one record, (windows, lines).
+        """Return the lines of the error of a simulated run of one record, (windows, lines).
 
         Those of the twist stand after those of the motion.
+
+        Args:
+            run: y, u and q, (3, samples); y alone, (1, samples), where no twist is compared.
+            index: of the record.
+            windows: which.
         """
         measured = self._recorded[index]
         most = _DIVERGED * np.abs(measured).max()
