@@ -7,6 +7,7 @@ import math
 import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -25,6 +26,7 @@ _LOOKED_AT = 100
 """Lines that tell delimiter and decimal mark."""
 _LABVIEW = "Comment"
 """Name of a last column in LabVIEW's measurement files, whose rows say nothing there."""
+_MOST_COLUMNS = 100_000
 _NOWHERE = 2**62
 """Number of a line that no file has."""
 _NUMBER = re.compile(
@@ -44,9 +46,11 @@ class _Layout:
         if self.delimiter is None:
             return rejoined(line.split()) if ":" in line else line.split()
         line = line.strip(" \r\n")
+        cells = line.split(self.delimiter)
         if '"' in line:
-            return [cell.strip() for cell in next(csv.reader([line], delimiter=self.delimiter))]
-        return [cell.strip() for cell in line.split(self.delimiter)]
+            with suppress(csv.Error):  # no quotes of cells: far too long, or without an end
+                cells = next(csv.reader([line], delimiter=self.delimiter))
+        return [cell.strip() for cell in cells]
 
     def is_number(self, cell: str) -> bool:
         """Tell whether a cell holds a number."""
@@ -120,6 +124,11 @@ def open_text(path: Path) -> Names:
     """Open a table; columns without names are called 0, 1, ...; raise InputError."""
     text = read_text(path)
     first = [line for _, line in _lines(text, _LOOKED_AT)]
+    if max((_columns_at_most(line) for line in first), default=0) > _MOST_COLUMNS:
+        raise InputError(
+            f"{path}: a line has more than {_MOST_COLUMNS} columns; a row is one sample, so "
+            "turn the table."
+        )
     grid = max((_Grid.of(one, first) for one in _LAYOUTS), key=lambda one: one.fitness(first))
     layout = grid.layout
     start, names, units = _start(grid, text)
@@ -132,13 +141,14 @@ def open_text(path: Path) -> Names:
     headings = {number: titled[int(number.strip("[]"))] for number in numbers}
     headings |= {name: titled[at] for name, at in places.items()}
 
-    twice = {name for name in names if names.count(name) > 1}
+    times = Counter(names)
+    twice = {name for name, number in times.items() if number > 1}
     listed = [str(at) if name in twice else name for at, name in enumerate(names)]
 
     def find(name: str, *, holes: bool = False) -> np.ndarray:
         if name in twice:
             raise InputError(
-                f"{path}: the column {name} is there {names.count(name)} times; rename one, or "
+                f"{path}: the column {name} is there {times[name]} times; rename one, or "
                 "name it by its number, counted from 0."
             )
         index = places[name] if name in places else int(name.strip("[]"))
@@ -146,6 +156,11 @@ def open_text(path: Path) -> Names:
         return _column(path, layout, text, start, index, columns, name, origin=origin, holes=holes)
 
     return Names(path, listed, find, [*numbers, *twice], headings, partial(find, holes=True))
+
+
+def _columns_at_most(line: str) -> int:
+    """Return how many cells a line has, if the most common of its delimiters is that."""
+    return 1 + max(line.count(d or " ") for d in _DELIMITERS)
 
 
 def _lines(text: str, most: int | None = None) -> Iterator[tuple[int, str]]:

@@ -393,6 +393,20 @@ def test_archive_of_a_few_bytes_that_stands_for_gigabytes_is_refused(tmp_path):
         import_files([tmp_path / "bytes.npz"], tmp_path / "out", options())
 
 
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        (";" * 1_000_000, r"more than 100000 columns; a row is one sample, so turn the table\.$"),
+        ('"' * 200_000, r"there is no r; the file holds "),
+    ],
+)
+def test_one_line_that_is_no_row_of_a_record_ends_in_a_sentence(tmp_path, text, sentence):
+    (tmp_path / "line.csv").write_text(text)
+    with pytest.raises(InputError, match=sentence):
+        import_files([tmp_path / "line.csv"], tmp_path / "out", options())
+    assert not (tmp_path / "out").exists()
+
+
 def test_many_columns_are_not_all_named(tmp_path):
     (tmp_path / "wide.csv").write_text(",".join(f"c{i}" for i in range(50_000)) + "\n1\n")
     with pytest.raises(InputError, match=r"there is no r; the file holds c0, .* and 49980 more\.$"):
