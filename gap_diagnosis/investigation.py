@@ -10,7 +10,6 @@ from functools import partial
 
 import numpy as np
 
-from fjr_records.driven import wrong_sign
 from fjr_records.periodic import RecordedExperiment, RecordedRealization
 from fjr_records.records import Record, RecordSet
 
@@ -24,13 +23,12 @@ from .model.quasi_static import Stations
 from .model.record_length import within
 from .model.rig_model import Model
 from .model.steady_runs import SteadyRuns
-from .model.twist import doubt_of, goes_along
 from .outcome.diagnosis import Bags, Diagnosis
-from .outcome.verdict_words import LOST, OUT_OF_TIME, ROUNDING, SWINGS_FREE, TWISTS
+from .outcome.verdict_words import LOST, ROUNDING
 from .verdict.coarse_encoder import with_coarse_encoder
 from .verdict.judgement import judge, reproduced
 from .verdict.kept_causes import kept
-from .verdict.notes import at_limits, yielding
+from .verdict.notes import of_fit, of_records, yielding
 from .verdict.tested_causes import LEAST_PRESENT, Tested
 from .which.catalogue import catalogue
 from .which.cell_fits import DRIFT, CellFitter
@@ -55,8 +53,6 @@ ASSUMED = (
 _HOPELESS = 5.0
 """Times the motion: where the refit misses more, nothing is searched, for no effect mends that but
 friction where the datasheet has none at all, so that a torque drives the axis away."""
-_SHOWN = 3
-"""Most runs of which the same is said."""
 _SEARCH_SHARE = 0.6
 """Of the budget for the search; the tests of what it found take about as long as one more step."""
 
@@ -204,7 +200,7 @@ def investigate_runs(
     tied = {t.effect: _tied(fitter, found, t, names) for t in tested}
     alternatives = {effect: [fit.effects[-1] for fit in fits] for effect, fits in tied.items()}
     progress("judgement")
-    notes = [*records.notes, *cut, *heard, *_notes(evidence, nominal, found)]
+    notes = [*records.notes, *cut, *heard, *of_records(evidence, nominal), *of_fit(found)]
     diagnosis = judge(fitter, model, found, tested, alternatives, bags, scatter, notes)
     if order.effects is None or ROUNDING in order.effects:
         fitter, found, diagnosis = with_coarse_encoder(fitter, model, found, diagnosis)
@@ -288,46 +284,3 @@ def _tied(fitter: CellFitter, found: Found, tested: Tested, names: Sequence[str]
         if as_well(other) or as_well(further := fitter.further(other)):
             tied.append(further)
     return tied
-
-
-def _notes(evidence: Evidence, nominal: Mapping[str, float], found: Found) -> list[str]:
-    if evidence.slow:
-        return _notes_of_fit(found)
-    loop, player = evidence.player.loop, evidence.player
-    notes = list(loop.notes)
-    if not loop.commanded:  # a controller that makes the torque has its sign
-        doubted = [(r.name, wrong_sign(r.torque, r.position)) for r in evidence.records.records]
-        notes += [f"{name}: {doubt}." for name, doubt in doubted if doubt is not None][:_SHOWN]
-    if evidence.records.swings_free:
-        notes.append(SWINGS_FREE)
-    if evidence.twist is not None:
-        notes.append(TWISTS)
-    elif ratio := goes_along(evidence.records, nominal, evidence.hop):
-        notes.append(doubt_of(ratio))
-    step = evidence.noise.step_rad
-    if step is not None and evidence.noise.std_rad <= 1.01 * step / math.sqrt(12.0):
-        notes.append(
-            f"The encoder counts in steps of {step:.3g} rad; what it rounds away counts as noise."
-        )
-    if not evidence.noise.known:
-        notes.append(
-            "The noise of the position is not known: no repeats, no standstill, and the highest "
-            "lines are not flat; so nothing is said of significance."
-        )
-    if None in loop.laws:
-        where = f" for {loop.laws.count(None)} of {len(loop.laws)} runs" if any(loop.laws) else ""
-        notes.append(f"The loop is not known{where}, so there {player.driven}{player.loses}.")
-    return [*notes, *_notes_of_fit(found)]
-
-
-def _notes_of_fit(found: Found) -> list[str]:
-    best = found.best
-    notes = [*found.notes, *at_limits(best.space, best.solution.x, best.model.plant)]
-    if best.effects and not best.solution.converged:
-        notes.append(
-            f"The fit of {' + '.join(best.effects)} has not converged: the sizes, and their "
-            "intervals, are those of where it was ended."
-        )
-    if not found.complete:
-        notes.append(OUT_OF_TIME)
-    return notes

@@ -148,8 +148,8 @@ class Ledger:
             if not sigma[cell] > 1.0:
                 continue
             level, band = divmod(cell, evidence.bands)
-            twist, band = divmod(band, len(evidence.edges) - 1)
-            low, high = evidence.edges[band], evidence.edges[band + 1]
+            twist, band = divmod(band, len(evidence.octaves))
+            low, high = evidence.octaves.edges[band : band + 2]
             found.append(
                 Place(
                     level=evidence.records.levels[level],

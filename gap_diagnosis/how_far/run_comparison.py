@@ -71,7 +71,7 @@ def compare_runs(
     """
     errors = evidence.errors(list(models.values()), parts)
     yardstick = _yardstick(evidence, parts)
-    own = len(evidence.edges) - 1  # bands of the motion
+    own = len(evidence.octaves)  # bands of the motion
     by_band = {
         name: _root_ratio(evidence.mean_squares(each, parts), yardstick).reshape(
             -1, evidence.bands
@@ -124,7 +124,7 @@ def _compare(
         time_s=np.arange(record.samples) / rate,
         position={"rig": record.position, **{name: run[0] for name, run in signals.items()}},
         torque={"rig": record.torque, **{name: run[1] for name, run in signals.items()}},
-        edges_hz=evidence.edges * evidence.line_hz,
+        edges_hz=evidence.octaves.edges * evidence.line_hz,
         errors=errors,
         over_velocity={name: binned(velocity, torque) for name, torque in lacking.items()},
         over_angle={name: binned(record.position, torque) for name, torque in lacking.items()},

@@ -4,6 +4,7 @@
 (`record_start`) by its `drive`: the loop that `record_loop` finds (gains by `controller_gains`) or
 the observer of `prediction`, with a torque as `record_torque` takes it. Steady periods are runs of
 one mean period (`steady_runs`); `simulated_rig.Simulator` repeats all their periods for the BLA.
-`evidence` cuts the errors into windows (`lapped`), cells and parts. `nominal` reads datasheets,
-`controller_check` compares torque and law, `discretisation` measures the simulation's own error.
+`evidence` cuts the errors into windows (`lapped`), cells (of bands, `octaves`) and parts. `nominal`
+reads datasheets, `controller_check` compares torque and law, `discretisation` measures the
+simulation's own error.
 """

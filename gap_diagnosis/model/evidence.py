@@ -17,10 +17,11 @@ from typing import Literal
 
 import numpy as np
 
-from fjr_records.record_noise import RecordNoise, band_lines, record_noise
+from fjr_records.record_noise import RecordNoise, record_noise
 from fjr_records.records import Record, RecordSet
 
 from .lapped import lapped, samples_of
+from .octaves import Octaves, lines_with_signal
 from .parts import Purpose, cut, joined, spans_of
 from .quasi_static import QuasiStaticSimulator, Stations
 from .record_rig import RecordSimulator
@@ -52,7 +53,7 @@ class Evidence:
         hop: half the length of a window, samples.
         lines: how many lines hold a signal, from line 0 on.
         twist: of the transmission; None where it was not recorded.
-        edges: (bands + 1,), first line of each band; band 0 is line 0, mean and slow motion.
+        octaves: bands of the lines of one signal.
     """
 
     def __init__(
@@ -86,13 +87,13 @@ class Evidence:
         else:
             known = records.noise if isinstance(records, SteadyRuns) else None
             self.noise = known or record_noise(records)
-            self.lines = self._lines_with_signal()
+            self.lines = lines_with_signal(records, self.noise, self._measured, self.hop)
             top_hz = self.lines * self.line_hz
             self.simulator = RecordSimulator(records, self.noise, top_hz, nominal)
         of_twist = records.twist_noise if isinstance(records, SteadyRuns) else None
         self.twist = None if self.slow else twist_of(records, nominal, self.hop, run_in, of_twist)
         self._recorded = [self._beside_twist(m, i) for i, m in enumerate(self._measured)]
-        self.edges = _edges(self.lines)
+        self.octaves = Octaves.of(self.hop, self.lines)
         frequency = (np.arange(self.lines) + 0.5) * self.line_hz
         held = [
             lapped(r.torque, self.hop)[:, : self.lines]
@@ -101,8 +102,7 @@ class Evidence:
         ]
         self._held = [self._beside_twist(lines, i) for i, lines in enumerate(held)]
         self.parts = tuple(cut(records, self.hop, run_in))
-        bands = np.searchsorted(self.edges, np.arange(self.lines), side="right") - 1
-        own = len(self.edges) - 1
+        own, bands = len(self.octaves), self.octaves.of_line
         self._band = np.concatenate([bands + own * k for k in range(self.bands // own)])
 
     def _beside_twist(self, lines: np.ndarray, index: int) -> np.ndarray:
@@ -111,21 +111,6 @@ class Evidence:
         if self.twist is None:
             return own
         return np.concatenate([own, self.twist.measured[index][:, : self.lines]], axis=1)
-
-    def _lines_with_signal(self) -> int:
-        """Return how many lines from line 0 on hold more than noise.
-
-        Noise that walks lies below what windows let through to the highest lines of a motion of
-        many turns, so they are looked for in the differences of the samples. White noise lies above
-        most of that, and an observer that crosses over as high as the rest says holds better.
-        """
-        cycles = 0.5 * (np.arange(self.hop) + 0.5) / self.hop
-        if not self.noise.walks:
-            power = np.mean(np.concatenate(self._measured) ** 2, axis=0)
-            return band_lines(power, self.noise.power(cycles))
-        steps = [lapped(np.diff(r.position), self.hop) for r in self.records.records]
-        power = np.mean(np.concatenate(steps) ** 2, axis=0)
-        return band_lines(power / (2.0 * np.sin(np.pi * cycles)) ** 2, self.noise.power(cycles))
 
     @property
     def line_hz(self) -> float:
@@ -141,12 +126,12 @@ class Evidence:
     @property
     def bands(self) -> int:
         """Number of bands of all signals; those of the twist stand after those of the motion."""
-        return (len(self.edges) - 1) * (1 if self.twist is None else 2)
+        return len(self.octaves) * (1 if self.twist is None else 2)
 
     @property
     def of_motion(self) -> np.ndarray:
         """Which lines of a window are those of the motion, not of the twist, bool (lines,)."""
-        return self._band < len(self.edges) - 1
+        return self._band < len(self.octaves)
 
     @cached_property
     def cells(self) -> int:
@@ -159,10 +144,10 @@ class Evidence:
         if not self.noise.known:
             return np.zeros(self.cells)
         if isinstance(self.records, SteadyRuns) and not self.noise.rounds:
-            seen = self._scattered(self.player.scattered(self.records.scatter))
+            seen = self.octaves.of_scatter(self.player.scattered(self.records.scatter))
             if seen is not None:
                 return self.power_beside_twist(seen)
-        return self.power_beside_twist(self._in_bands(self.noise))
+        return self.power_beside_twist(self.octaves.of_noise(self.noise))
 
     def power_beside_twist(self, of_motion: np.ndarray) -> np.ndarray:
         """Return the variance of an error in each cell, (cells,), rad2, from that of the motion.
@@ -170,31 +155,14 @@ class Evidence:
         Args:
             of_motion: in each band, (bands,), of each level, (levels * bands,), or in all alike.
         """
-        levels, own = len(self.records.levels), len(self.edges) - 1
+        levels, own = len(self.records.levels), len(self.octaves)
         in_bands = of_motion.reshape(-1, own) if of_motion.ndim else of_motion
         found = np.broadcast_to(in_bands, (levels, own))
         if self.twist is not None:
             noise = self.twist.noise
-            power = self._in_bands(noise) if noise.known else np.zeros(own)
+            power = self.octaves.of_noise(noise) if noise.known else np.zeros(own)
             found = np.concatenate([found, np.tile(power, (levels, 1))], axis=1)
         return found.ravel()
-
-    def _in_bands(self, noise: RecordNoise) -> np.ndarray:
-        """Return the variance of a noise in each band, (bands,), rad2."""
-        cycles = 0.5 * (np.arange(self.lines) + 0.5) / self.hop
-        return np.add.reduceat(noise.power(cycles), self.edges[:-1]) / np.diff(self.edges)
-
-    def _scattered(self, scatter: Sequence[np.ndarray]) -> np.ndarray | None:
-        """Return the variance in each band by how errors differ between periods, (bands,).
-
-        In a loop noise is not white: the controller answers that of the encoder. None for one
-        period, or where periods are equal.
-        """
-        rows = np.concatenate([lapped(row, self.hop).reshape(-1, self.hop) for row in scatter])
-        if not rows.any():
-            return None
-        squares = np.mean(rows[:, : self.lines] ** 2, axis=0)
-        return np.add.reduceat(squares, self.edges[:-1]) / np.diff(self.edges)
 
     @property
     def unseen(self) -> tuple[str, ...]:
@@ -367,11 +335,3 @@ class Evidence:
 def _least_held(record: Record) -> float:
     """Return the gain of a loop (N m/rad) that holds next to nothing, above zero."""
     return _SOFT * float(np.std(record.torque) / max(np.std(record.position), 1e-30)) + 1e-300
-
-
-def _edges(lines: int) -> np.ndarray:
-    """Return the first line of each band: line 0 alone, then bands an octave wide or less."""
-    edges = [0, 1]
-    while edges[-1] < lines:
-        edges.append(min(edges[-1] + max(edges[-1], 4), lines))
-    return np.array(edges)

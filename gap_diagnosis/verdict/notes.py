@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ..outcome.verdict_words import ROUNDING
+from fjr_records.driven import wrong_sign
+
+from ..model.evidence import Evidence
+from ..model.twist import doubt_of, goes_along
+from ..outcome.verdict_words import OUT_OF_TIME, ROUNDING, SWINGS_FREE, TWISTS
 from ..which.comparison import NOTHING_LEFT
+from ..which.found import Found
 from ..which.other_splits import YIELDS
 from ..which.search_space import Space
+
+_SHOWN = 3
+"""Most runs of which the same is said."""
 
 SCALED = "A torque-constant error is equivalent to scaling all parameters."
 
@@ -68,6 +77,56 @@ def beyond_tolerance(
         f"{', '.join(far)} lie beyond the tolerance of the nominal file: look for a gain, "
         "of the torque or of the encoder (an eccentric one has one about its zero)."
     ]
+
+
+def of_records(evidence: Evidence, nominal: Mapping[str, float]) -> list[str]:
+    """Return what a reader must know of the records and of how they were compared.
+
+    Args:
+        evidence: the records.
+        nominal: datasheet values by the names of PLANT.
+    """
+    if evidence.slow:
+        return []
+    loop, player = evidence.player.loop, evidence.player
+    notes = list(loop.notes)
+    if not loop.commanded:  # a controller that makes the torque has its sign
+        doubted = [(r.name, wrong_sign(r.torque, r.position)) for r in evidence.records.records]
+        notes += [f"{name}: {doubt}." for name, doubt in doubted if doubt is not None][:_SHOWN]
+    if evidence.records.swings_free:
+        notes.append(SWINGS_FREE)
+    if evidence.twist is not None:
+        notes.append(TWISTS)
+    elif ratio := goes_along(evidence.records, nominal, evidence.hop):
+        notes.append(doubt_of(ratio))
+    step = evidence.noise.step_rad
+    if step is not None and evidence.noise.std_rad <= 1.01 * step / math.sqrt(12.0):
+        notes.append(
+            f"The encoder counts in steps of {step:.3g} rad; what it rounds away counts as noise."
+        )
+    if not evidence.noise.known:
+        notes.append(
+            "The noise of the position is not known: no repeats, no standstill, and the highest "
+            "lines are not flat; so nothing is said of significance."
+        )
+    if None in loop.laws:
+        where = f" for {loop.laws.count(None)} of {len(loop.laws)} runs" if any(loop.laws) else ""
+        notes.append(f"The loop is not known{where}, so there {player.driven}{player.loses}.")
+    return notes
+
+
+def of_fit(found: Found) -> list[str]:
+    """Return what a reader must know of the search and of the fit in which it ended."""
+    best = found.best
+    notes = [*found.notes, *at_limits(best.space, best.solution.x, best.model.plant)]
+    if best.effects and not best.solution.converged:
+        notes.append(
+            f"The fit of {' + '.join(best.effects)} has not converged: the sizes, and their "
+            "intervals, are those of where it was ended."
+        )
+    if not found.complete:
+        notes.append(OUT_OF_TIME)
+    return notes
 
 
 def at_limits(space: Space, x: np.ndarray, plant: Mapping[str, float]) -> list[str]:

@@ -154,7 +154,7 @@ def in_the_loop(evidence: Evidence, model: Model) -> Rounded:
         lines = lapped(runs[:, 0], evidence.hop)[..., : evidence.lines]
         scatter[record.level].append(np.var(lines, axis=0, ddof=1))
     by_line = np.array([np.concatenate(scatter[level]).mean(axis=0) for level in levels])
-    by_band = np.add.reduceat(by_line, evidence.edges[:-1], axis=1) / np.diff(evidence.edges)
+    by_band = evidence.octaves.means(by_line)
     return Rounded(added, (1.0 + 1.0 / _SIMULATED) * by_band.ravel())
 
 

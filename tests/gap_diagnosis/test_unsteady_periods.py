@@ -235,5 +235,5 @@ def test_where_the_loop_is_not_known_the_noise_is_that_of_what_the_torque_predic
     assert 0.5 < np.median(ratio) < 1.5 and ratio.max() < 3.0
     # by how much the recorded position scatters it would not be
     scatter = [rows[0] for rows in evidence.records.scatter]
-    seen = np.tile(evidence._scattered(scatter), len(evidence.records.levels))
+    seen = np.tile(evidence.octaves.of_scatter(scatter), len(evidence.records.levels))
     assert (left / seen).max() > 5.0 or (left / seen).min() < 0.2
