@@ -20,8 +20,9 @@ SWINGS_FREE = (
 
 LOST = (
     "The best explanation still misses half of the squared motion or more, so it predicts little "
-    "and none of its causes is named: check the datasheet, the factor of the torque, and whether "
-    "the runs are sampled fast enough for the rig."
+    "and none of its causes is named: check the datasheet, the factor of the torque, whether the "
+    "runs are sampled fast enough for the rig, and whether another axis moved beside this one: no "
+    "model of a single axis has the torques of others."
 )
 TWISTS = (
     "The link has an encoder, so the twist of the transmission is compared beside the motion, less "
