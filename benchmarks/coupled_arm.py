@@ -28,7 +28,8 @@ from gap_diagnosis import read_nominal
 from gap_diagnosis.any_record import diagnose
 from gap_diagnosis.outcome.diagnosis import Diagnosis
 
-BASE_HZ, LINES, BRISTLE_RAD, COUNT_RAD, INNER = 0.1, 5, 1e-3, 2.0 * np.pi / 2**19, 20
+BASE_HZ, LINES, MOVE_S, INNER = 0.1, 5, 2.0, 20
+BRISTLE_RAD, COUNT_RAD = 1e-3, 2.0 * np.pi / 2**19
 SIZES = {
     "coulomb_friction.motor_nm": "coulomb",
     "viscous_friction.motor_nm_s_rad": "viscous",
@@ -60,7 +61,10 @@ class Arm:
     @classmethod
     def drawn(cls, rng: np.random.Generator) -> Arm:
         """Draw one."""
-        masses, lengths = 10.0 ** rng.uniform(0, 2) * rng.uniform(0.5, 1.5, 2), rng.uniform(0.2, 1, 2)
+        masses, lengths = (
+            10.0 ** rng.uniform(0, 2) * rng.uniform(0.5, 1.5, 2),
+            rng.uniform(0.2, 1, 2),
+        )
         centres = lengths * rng.uniform(0.3, 0.6, 2)
         carried = np.array([
             masses[0] * centres[0] ** 2 + masses[1] * lengths[0] ** 2,
@@ -87,15 +91,17 @@ def motion(rng: np.random.Generator, rate_hz: float, seconds: float) -> np.ndarr
     for _ in AXES:
         angle = np.zeros(stamps.size)
         if moves:
-            places = np.cumsum(np.ones(int(seconds / 2.0) + 2)) * 0.0 + rng.uniform(-1, 1, int(seconds / 2.0) + 2)
-            share = np.minimum((stamps % 2.0) / 1.5, 1.0)
+            places = rng.uniform(-1.0, 1.0, int(seconds / MOVE_S) + 2)
+            share = np.minimum((stamps % MOVE_S) / (0.75 * MOVE_S), 1.0)
             smooth = share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
-            at = (stamps / 2.0).astype(int)
+            at = (stamps / MOVE_S).astype(int)
             angle = places[at] + smooth * (places[at + 1] - places[at])
         else:
             for line in range(1, LINES + 1):
                 w = 2.0 * np.pi * BASE_HZ * line
-                angle += rng.normal() * 0.5 / line * np.sin(w * stamps + rng.uniform(0.0, 2 * np.pi))
+                angle += (
+                    rng.normal() * 0.5 / line * np.sin(w * stamps + rng.uniform(0.0, 2 * np.pi))
+                )
         found.append(angle)
     return np.array(found).T.copy()
 
