@@ -83,19 +83,19 @@ def joined(
     """Return the numbers on parts, one after the other.
 
     Args:
-        lines: by record, (windows, lines) of its span.
+        lines: by record, (..., windows, lines) of its span.
         spans: from `spans_of` these parts, or more.
         parts: which.
 
     Returns:
-        (numbers,).
+        (..., numbers).
     """
     pieces = []
     for part in parts:
         first = spans[part.record].start
-        own = lines[part.record][part.windows.start - first : part.windows.stop - first]
-        pieces.append(own.ravel())
-    return np.concatenate(pieces)
+        own = lines[part.record][..., part.windows.start - first : part.windows.stop - first, :]
+        pieces.append(own.reshape(*own.shape[:-2], -1))
+    return np.concatenate(pieces, axis=-1)
 
 
 def _purpose(records: int, place: int, block: int) -> Purpose:

@@ -8,7 +8,7 @@ import numpy as np
 
 from fjr_sim_node import effects as fx
 
-from .cell_fits import STICKING, CellFitter
+from .cell_fits import LEAST_HOPE, STICKING, CellFitter
 from .comparison import NOTHING_LEFT, CellFit
 from .equivalents import ONE_CAUSE, founded, holders, partners, plainness
 from .friction_left import FRICTION
@@ -175,9 +175,15 @@ class Extension:
         Of friction that is small the linear prediction, by which they are ordered, says little.
         """
         ordered = sorted(screened, key=lambda e: -screened[e].gain)
-        proposals: dict[str, list[Proposal]] = {}
+        begun, proposals = self._fitter.begun(parent), dict[str, list[Proposal]]()
         for first in range(0, len(ordered), most):
-            proposals |= {e: screened[e].proposals() for e in ordered[first : first + most]}
+            batch = ordered[first : first + most]
+            hope = {e: max(screened[e].gain, begun - screened[e].least()) for e in batch}
+            enough = max(_START_LESS * max(hope.values()), LEAST_HOPE)
+            hopeful = {e for e in batch if hope[e] >= enough} | (
+                lacked(self._fitter.nominal) & {*batch}
+            )
+            proposals |= {e: screened[e].proposals(scaled=e in hopeful) for e in batch}
             if any(self._fitter.promises(parent, found) for found in proposals.values()):
                 break
         return proposals

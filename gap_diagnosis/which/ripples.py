@@ -112,14 +112,13 @@ class Ripples:
         """Return sizes of sine and cosine of each number of cycles, and the fall of the cost."""
         own = []
         for number in cycles:
-            moved = [
-                self._moved(k, self._torques(effect, k, number)) for k in range(len(self._runs))
-            ]
-            for quarter in (0, 1):
-                changes = {i: pair[quarter] for i, pair in zip(self._runs, moved, strict=True)}
-                column = self._evidence.changes(changes, self._parts, self._every)
-                own.append(self._beyond(column * self._weight))
-        columns = np.array(own)
+            moved = {
+                index: self._moved(k, self._torques(effect, k, number))
+                for k, index in enumerate(self._runs)
+            }
+            changes = self._evidence.changes(moved, self._parts, self._every)
+            own.append(self._beyond(changes * self._weight))
+        columns = np.concatenate(own)
         sizes = np.linalg.lstsq(columns.T, -self._left, rcond=1e-6)[0]
         return sizes, -float(sizes @ (columns @ self._left))
 
@@ -180,8 +179,8 @@ class Ripples:
         return samples if self._run_in else 2 * (self._responses[k].shape[1] - 1)
 
     def _beyond(self, errors: np.ndarray) -> np.ndarray:
-        """Return what the parent's parameters can't follow of errors, (errors,)."""
-        return errors - self._basis @ (self._basis.T @ errors)
+        """Return what the parent's parameters can't follow of errors, (..., errors)."""
+        return errors - (errors @ self._basis) @ self._basis.T
 
 
 def _thinned(tried: np.ndarray) -> np.ndarray:

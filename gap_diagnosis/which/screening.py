@@ -115,13 +115,18 @@ class Screening:
             self._tries.add([(self._seeds[k], self._changes[k]) for k in order], self._plain[order])
         return self._all()[0][0]
 
-    def proposals(self) -> list[Proposal]:
-        """Return starting points, tried at several more sizes, the most promising first.
+    def proposals(self, *, scaled: bool = True) -> list[Proposal]:
+        """Return starting points, the most promising first.
+
+        Args:
+            scaled: whether the best seeds are tried at several more sizes.
 
         Returns:
             (cost, space, point), ascending in cost.
         """
         self.least()
+        if not scaled:
+            return self._all()
         best = self._tries.best(_SCALED)
         self._tries.run([(c, c.size * factor) for c in best for factor in _SIZES])
         self._tries.run_straightened(best)
