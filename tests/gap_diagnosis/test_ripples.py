@@ -77,6 +77,8 @@ def test_averaged_changes_have_the_lines_of_the_changes(every):
     blocks = change[: samples // every * every].reshape(-1, every).mean(axis=1)
     averaged = evidence.changes({0: blocks}, parts, every)
     assert np.abs(averaged - full).max() < 0.04 * np.abs(full).max()
+    both = evidence.changes({0: np.array([change, -2.0 * change])}, parts)
+    assert np.allclose(both, [full, -2.0 * full], rtol=0.0, atol=1e-12 * np.abs(full).max())
 
 
 @pytest.mark.parametrize("hop", [8, 30, 160, 1806, 4000])

@@ -72,3 +72,29 @@ def test_a_size_beyond_the_largest_is_tried_at_the_largest():
     point = found.proposals()[0][2]
     assert np.isclose(space.model(point).effects[size], LARGEST * tiny)
     assert np.allclose(sorted(tried), [tiny, tiny, LARGEST * tiny])  # no size twice but the seed's
+
+
+def test_an_effect_without_hope_is_tried_at_no_further_size():
+    size = "torque_bias.torque_nm"
+    tried: list[float] = []
+
+    def bent(models: list[Model]) -> np.ndarray:
+        """Return errors that a size of 1 doubles and one of 0.1 makes smaller."""
+        tried.extend(model.effects[size] for model in models if size in model.effects)
+        sizes = np.array([model.effects.get(size, 0.0) for model in models])
+        return (1.0 - sizes + 11.0 * sizes**2)[:, None] * np.ones(2 * HALF)
+
+    def screened() -> Screening:
+        model, base = Model(NOMINAL, {}), len(NOMINAL)
+        parent = Solution(
+            np.zeros(base), 2.0 * HALF, np.zeros((2 * HALF, base)), bent([model])[0], True
+        )
+        space = Space(NOMINAL, (size,), (1.0,))
+        return Screening(parent, model, [{size: 1.0}], lambda _: space, bent, costs)
+
+    alone = screened().proposals(scaled=False)
+    few, tried[:] = len(tried), []
+    scaled = screened().proposals()
+    assert len(tried) > few
+    assert scaled[0][0] <= alone[0][0]
+    assert {cost for cost, *_ in alone} < {cost for cost, *_ in scaled}
