@@ -47,8 +47,8 @@ class _Layout:
             return rejoined(line.split()) if ":" in line else line.split()
         line = line.strip(" \r\n")
         cells = line.split(self.delimiter)
-        if '"' in line:
-            with suppress(csv.Error):  # no quotes of cells: far too long, or without an end
+        if '"' in line and line.count('"') % 2 == 0:  # else one has no end, and is none
+            with suppress(csv.Error):  # a cell that is longer than any
                 cells = next(csv.reader([line], delimiter=self.delimiter))
         return [cell.strip() for cell in cells]
 
@@ -159,8 +159,8 @@ def open_text(path: Path) -> Names:
 
 
 def _columns_at_most(line: str) -> int:
-    """Return how many cells a line has, if the most common of its delimiters is that."""
-    return 1 + max(line.count(d or " ") for d in _DELIMITERS)
+    """Return how many cells a line has by the delimiter that makes most of it."""
+    return max(len(line.split()) if d is None else line.count(d) + 1 for d in _DELIMITERS)
 
 
 def _lines(text: str, most: int | None = None) -> Iterator[tuple[int, str]]:

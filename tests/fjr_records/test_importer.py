@@ -16,6 +16,7 @@ from fjr_kit.errors import InputError
 from fjr_records.importers.import_map import Column, parse_harmonics, parse_map
 from fjr_records.importers.importer import import_files
 from fjr_records.importers.record_file import ImportOptions
+from fjr_records.importers.text import open_text
 from fjr_records.periodic import read_experiment
 from fjr_records.records import read_records
 
@@ -405,6 +406,19 @@ def test_one_line_that_is_no_row_of_a_record_ends_in_a_sentence(tmp_path, text, 
     with pytest.raises(InputError, match=sentence):
         import_files([tmp_path / "line.csv"], tmp_path / "out", options())
     assert not (tmp_path / "out").exists()
+
+
+def test_a_quote_without_an_end_and_wide_gaps_hide_no_cell(tmp_path):
+    """An inch mark opens nothing, and white space of any width is one gap."""
+    gap = " " * 60_000
+    rows = "\n".join(f"{k}{gap}{0.1 * k}{gap}{0.2 * k}" for k in range(3))
+    (tmp_path / "wide.txt").write_text(f"r{gap}u{gap}y\n{rows}\n")
+    (tmp_path / "inch.csv").write_text('r,"u,y\n0,0,0\n1,0.1,0.2\n2,0.2,0.4\n')
+    wide, inch = (open_text(tmp_path / name) for name in ("wide.txt", "inch.csv"))
+    assert wide.known == ["r", "u", "y"]
+    assert wide.find("y").tolist() == [0.0, 0.2, 0.4]
+    assert len(inch.known) == 3
+    assert inch.find("y").tolist() == [0.0, 0.2, 0.4]
 
 
 def test_many_columns_are_not_all_named(tmp_path):
