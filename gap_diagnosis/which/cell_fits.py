@@ -30,8 +30,6 @@ from .seen_twist import PLAYS, play
 STICKING = ("coulomb_friction", "presliding_friction")
 """Friction, and the bristles by which it yields before it slides."""
 _ADDED_ROUNDS = (6, 4)
-LEAST_HOPE = 5.0
-"""What the best start of an effect must gain, or be predicted to, to be tried at more sizes."""
 _LEAST_PROMISE = 20.0  # a start that gains less than this (twice the nats) is not pursued
 _STARTS = 2
 RIPPLES_TRIED = 3

@@ -8,7 +8,7 @@ import numpy as np
 
 from fjr_sim_node import effects as fx
 
-from .cell_fits import LEAST_HOPE, STICKING, CellFitter
+from .cell_fits import STICKING, CellFitter
 from .comparison import NOTHING_LEFT, CellFit
 from .equivalents import ONE_CAUSE, founded, holders, partners, plainness
 from .friction_left import FRICTION
@@ -28,6 +28,8 @@ _MUCH_LESS = 0.3  # of the greatest gain: a cause that gains less waits for the 
 _WORTH_RICHER = 0.2
 """Of what is left in the band where it gains most: a ripple that closes less is none of two
 harmonics either, and its second one is not looked for, which costs more than all else."""
+_LEAST_HOPE = 5.0
+"""What the best start of an effect must gain, or be predicted to, to be tried at more sizes."""
 _START_LESS = 0.2  # of the greatest gain of a start: an effect whose best one gains less waits
 
 Progress = Callable[[str], None]
@@ -173,17 +175,19 @@ class Extension:
         """Return starts of those that are screened best, so many at a time until one promises.
 
         Of friction that is small the linear prediction, by which they are ordered, says little.
+        What gains and promises next to nothing, or much less than the best, is tried at no more
+        sizes, unless it is friction that the datasheet lacks.
         """
         ordered = sorted(screened, key=lambda e: -screened[e].gain)
         begun, proposals = self._fitter.begun(parent), dict[str, list[Proposal]]()
+        always = lacked(self._fitter.nominal)
         for first in range(0, len(ordered), most):
             batch = ordered[first : first + most]
             hope = {e: max(screened[e].gain, begun - screened[e].least()) for e in batch}
-            enough = max(_START_LESS * max(hope.values()), LEAST_HOPE)
-            hopeful = {e for e in batch if hope[e] >= enough} | (
-                lacked(self._fitter.nominal) & {*batch}
-            )
-            proposals |= {e: screened[e].proposals(scaled=e in hopeful) for e in batch}
+            enough = max(_START_LESS * max(hope.values()), _LEAST_HOPE)
+            proposals |= {
+                e: screened[e].proposals(scaled=hope[e] >= enough or e in always) for e in batch
+            }
             if any(self._fitter.promises(parent, found) for found in proposals.values()):
                 break
         return proposals

@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
+from test_evidence import NOMINAL as RIG
+from test_evidence import records
 
 from fjr_sim_node.plant import PLANT
+from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.model.rig_model import Model
+from gap_diagnosis.which.cell_fits import CellFitter
+from gap_diagnosis.which.extension import Extension
 from gap_diagnosis.which.least_squares import Solution
 from gap_diagnosis.which.screening import LARGEST, Screening
 from gap_diagnosis.which.search_space import Space
@@ -79,10 +84,10 @@ def test_an_effect_without_hope_is_tried_at_no_further_size():
     tried: list[float] = []
 
     def bent(models: list[Model]) -> np.ndarray:
-        """Return errors that a size of 1 doubles and one of 0.1 makes smaller."""
+        """Return errors that a size of 1 halves and one of 0.2 clears; 2 is predicted."""
         tried.extend(model.effects[size] for model in models if size in model.effects)
         sizes = np.array([model.effects.get(size, 0.0) for model in models])
-        return (1.0 - sizes + 11.0 * sizes**2)[:, None] * np.ones(2 * HALF)
+        return (1.0 - 6.0 * sizes + 5.5 * sizes**2)[:, None] * np.ones(2 * HALF)
 
     def screened() -> Screening:
         model, base = Model(NOMINAL, {}), len(NOMINAL)
@@ -96,5 +101,22 @@ def test_an_effect_without_hope_is_tried_at_no_further_size():
     few, tried[:] = len(tried), []
     scaled = screened().proposals()
     assert len(tried) > few
-    assert scaled[0][0] <= alone[0][0]
+    assert scaled[0][0] < alone[0][0]
     assert {cost for cost, *_ in alone} < {cost for cost, *_ in scaled}
+
+
+def test_the_cause_is_tried_at_more_sizes_and_what_promises_nothing_is_not(monkeypatch):
+    scaled: dict[str, bool] = {}
+    proposals = Screening.proposals
+
+    def told(self: Screening, **given: bool) -> list:
+        scaled[next(iter(self._seeds[0])).split(".")[0]] = given.get("scaled", True)
+        return proposals(self, **given)
+
+    monkeypatch.setattr(Screening, "proposals", told)
+    fitter = CellFitter(Evidence(records({"torque_bias.torque_nm": 3.0}, runs=2), RIG), RIG, 0.1)
+    refit = fitter.refit()
+    effects = ["torque_bias", "extra_mode", "delay"]
+    found = Extension(fitter, effects, lambda _: None).extended(refit, [refit])
+    assert found[0].effects == ("torque_bias",)
+    assert scaled["torque_bias"] and not all(scaled.values())

@@ -126,6 +126,9 @@ def test_play_and_stiffness_are_read_off_the_twist(effect):
     assert seen.plant["jm"] == pytest.approx(TRUE["jm"], rel=0.05)
     sizes = [next(iter(model.effects.values())) for model in tried]
     assert min(sizes) < 2e-2 < max(sizes)
+    fitted = [evidence.records.records[evidence.parts[p].record] for p in evidence.parts_for("fit")]
+    reach = max(np.ptp(r.link - r.position) for r in fitted)
+    assert min(sizes) > 0.0 and max(sizes) < reach
 
 
 def test_stiffness_play_and_damping_are_seen_in_the_twist():
