@@ -10,7 +10,6 @@ from dataclasses import replace
 
 from fjr_sim_node import effects as fx
 
-from ..outcome.verdict_words import explanation
 from ..which.cell_fits import CellFitter
 from ..which.comparison import CellFit
 from ..which.equivalents import founded, partners
@@ -18,6 +17,7 @@ from ..which.found import Found
 from ..which.gains import gain, left_of, stands_for
 from ..which.seen_together import lacked
 from .judgement import FEWEST_PARTS
+from .not_named import unsure, why_not
 from .tested_causes import Tested, causes_with_tests
 
 Progress = Callable[[str], None]
@@ -31,8 +31,6 @@ _TWICE = 0.15
 """Of what two near equivalents close: where each closes less beside the other, either alone does
 nearly all, and both together are one cause whose law has another form than the catalogue's."""
 _RIVALS = 3  # that did best when a cause was chosen, one of which may take its place
-_MUCH = 0.5
-"""Share of the gap that a cause closes, from which on it is said why it is not named."""
 
 
 def kept(
@@ -111,22 +109,12 @@ def kept(
             continue
         if guessed and weakest.passed:
             doubted[weakest.effect] = weakest.present
-        notes += [*_changing(weakest), *_kin(weakest), *_bent(weakest)]
+        notes += [*why_not(weakest)]
         steps, tested = fewer, tests
-    notes += _unsure({e: p for e, p in doubted.items() if e not in steps[-1].effects})
+    notes += unsure({e: p for e, p in doubted.items() if e not in steps[-1].effects})
     if tested and any(len(fit.effects) != count for count, fit in enumerate(steps)):
         steps = [steps[0], *_one_by_one(fitter, steps[-1], tested)]
     return replace(found, steps=steps, notes=tuple(notes)), _bearing(tested)
-
-
-def _unsure(doubted: Mapping[str, float]) -> list[str]:
-    """Return the sentence on causes that passed all tests, but not surely enough for a third."""
-    if not doubted:
-        return []
-    shown = ", ".join(f"{explanation([effect])} ({p:.0%})" for effect, p in doubted.items())
-    return [
-        f"What may be there as well, but is not sure enough to be named beside two others: {shown}."
-    ]
 
 
 def _without(names: set[str], tested: Sequence[Tested]) -> list[Tested]:
@@ -196,40 +184,6 @@ def _in_its_place(
         return None
     most = max(fits, key=lambda fit: gain(fitter, fit, without).mean)
     return most if stands_for(fitter, most, best, tested.gain.mean) else None
-
-
-def _changing(tested: Tested) -> list[str]:
-    """Return the sentence on a cause that closes much, but not with the same size at all levels."""
-    if tested.invariant or not tested.gain.present or not tested.share.value >= _MUCH:
-        return []
-    return [
-        f"{explanation([tested.effect]).capitalize()} would close {tested.share.value:.0%} of what "
-        "the refit left, but not with the same size at all levels "
-        f"(p = {tested.invariance_p:.1g}), so it is not named: what is there follows another law."
-    ]
-
-
-def _kin(tested: Tested) -> list[str]:
-    """Return the sentence on a cause that is not named since most of the error stays beside it."""
-    if not tested.nearest_kin:
-        return []
-    return [
-        f"{explanation([tested.effect]).capitalize()} would close {tested.share.value:.0%} of what "
-        "the refit left, and does so on data that no fit has seen, but most of the error stays, so "
-        "it is not named: what is there may be of a law whose nearest kin in the catalogue it is."
-    ]
-
-
-def _bent(tested: Tested) -> list[str]:
-    """Return the sentence on a cause that is not named since its law ended at a limit."""
-    if not tested.of_another_form or not tested.share.value >= _MUCH:
-        return []
-    parameter = fx.parameter(str(tested.bounded))
-    return [
-        f"{explanation([tested.effect]).capitalize()} would close {tested.share.value:.0%} of what "
-        f"the refit left, but its {parameter.name.split('.')[1]} ended where a fit may go no "
-        "further, so it is not named: what is there is akin to it, of another form."
-    ]
 
 
 def _taken_out(fitter: CellFitter, before: Sequence[CellFit], weakest: Tested) -> list[CellFit]:

@@ -12,22 +12,15 @@ from .cell_fits import STICKING, CellFitter
 from .comparison import NOTHING_LEFT, CellFit
 from .equivalents import ONE_CAUSE, founded, holders, partners, plainness
 from .friction_left import FRICTION
-from .gains import NEARLY_ALL, Gain, closed, gain, left_of, likelihood, stands_for
-from .harmonics import WORTH_A_HARMONIC, with_second_harmonic
+from .gains import NEARLY_ALL, Gain, gain, left_of, likelihood, stands_for
+from .polish import MOST, MUCH_LESS, OUTDATED, Polish, ranked
 from .screening import Proposal, Screening
 from .seen_together import LACKED, lacked
 
 _PROPOSED, _FITTED, _STARTS = (7, 5), (5, 3), (2, 1)
 """Effects that are tried at several sizes, those of them that are fitted, and from how many starts:
 beside no cause yet, beside others."""
-_POLISHED = 2  # leading fits of a step that are taken further
 _AGAIN = 8  # effects that are screened beside a cause, and those that depend on others
-_OUTDATED = 0.1  # of the squared error that is left: then what was screened before is too far
-_MOST = 0.5  # of the squared error: a fit that leaves more leaves most of it
-_MUCH_LESS = 0.3  # of the greatest gain: a cause that gains less waits for the next step
-_WORTH_RICHER = 0.2
-"""Of what is left in the band where it gains most: a ripple that closes less is none of two
-harmonics either, and its second one is not looked for, which costs more than all else."""
 _LEAST_HOPE = 5.0
 """What the best start of an effect must gain, or be predicted to, to be tried at more sizes."""
 _START_LESS = 0.2  # of the greatest gain of a start: an effect whose best one gains less waits
@@ -98,7 +91,7 @@ class Extension:
         if not parent.effects and not self._fitter.evidence.slow and set(LACKED) & set(effects):
             self._progress("friction and load together")
             fits += self._fitter.together(parent, self.effects)
-        return self._polished(self.ranked(fits, parent), parent)
+        return Polish(self._fitter, self._progress).polished(self.ranked(fits, parent), parent)
 
     def _sticking(self, parent: CellFit, effects: Sequence[str]) -> CellFit | None:
         """Return the parent with friction and its bristles, where there is no friction yet."""
@@ -133,13 +126,13 @@ class Extension:
         repeating = [
             fit
             for fit, found in zip(fits, gains, strict=True)
-            if found.present and found.mean > _MUCH_LESS * gains[0].mean
+            if found.present and found.mean > MUCH_LESS * gains[0].mean
         ]
         if not repeating:
             return None
         left = [left_of(self._fitter, fit, parent) for fit in present]
         nearly_all = present[int(np.argmin(left))]
-        if min(left) < NEARLY_ALL and left_of(self._fitter, repeating[0], parent) > _MOST:
+        if min(left) < NEARLY_ALL and left_of(self._fitter, repeating[0], parent) > MOST:
             return nearly_all
         first = repeating[0]
         gained = self.gain(first, parent).mean
@@ -163,7 +156,7 @@ class Extension:
 
     def ranked(self, fits: Sequence[CellFit], parent: CellFit) -> list[CellFit]:
         """Return fits by what they gain over their parent, the best first."""
-        return sorted(fits, key=lambda fit: -self.gain(fit, parent).mean)
+        return ranked(self._fitter, fits, parent)
 
     def gain(self, after: CellFit, before: CellFit) -> Gain:
         """Return what one fit gains over another on unseen parts."""
@@ -203,70 +196,6 @@ class Extension:
         most = max(gains.values(), default=0.0)
         return [e for e in ordered if gains[e] >= _START_LESS * most]
 
-    def _polished(self, fits: Sequence[CellFit], parent: CellFit) -> list[CellFit]:
-        """Return ranked fits, those that lead and may be chosen taken further, ranked anew."""
-        leading = fits[:_POLISHED]
-        first = [fit.effects[-1] for fit in leading]
-        near = len(partners(first[:1], set(first), self._fitter.nominal)) > 1
-        promising = [fit for fit in leading if self._may_be_chosen(fit, leading[0], parent)]
-        if near and promising:
-            promising = list(leading)
-        others = [fit for fit in fits if not any(fit is one for one in promising)]
-        further = [self._enriched(self._settled(f, parent, near), parent) for f in promising]
-        return self.ranked([*further, *others], parent)
-
-    def _may_be_chosen(self, fit: CellFit, first: CellFit, parent: CellFit) -> bool:
-        """Tell whether a fit that leads may be chosen once it is taken further.
-
-        Not where it neither repeats on unseen parts nor closes much, or gains much less than the
-        first one.
-        """
-        left, found = left_of(self._fitter, fit, parent), self.gain(fit, parent)
-        if left < _OUTDATED:
-            return True
-        repeats = found.present or left < _MOST
-        return repeats and found.mean > _MUCH_LESS * self.gain(first, parent).mean
-
-    def _settled(self, fit: CellFit, parent: CellFit, alike: bool) -> CellFit:
-        """Return a fit that leads, taken to its end.
-
-        A fit begins with the weights of what its parent leaves, so one that closes most of that
-        ends elsewhere by the weights of what itself leaves; which of two that are near equivalents
-        does better shows there alone.
-
-        Args:
-            fit: one that leads.
-            parent: the fit that it extends.
-            alike: whether it has a near equivalent that leads as well.
-        """
-        closes_little = left_of(self._fitter, fit, parent) > _OUTDATED
-        added = fit.effects[len(parent.effects) :]
-        alike = alike or any(fx.EFFECTS[effect].of_bare_plant for effect in added)
-        if fit.solution.converged and closes_little and not alike:
-            return fit
-        self._progress(f"{' + '.join(fit.effects)}, further")
-        return self._fitter.to_its_end(fit)
-
-    def _enriched(self, fit: CellFit, parent: CellFit) -> CellFit:
-        """Return a fit whose last effect is a ripple with its second harmonic, if that repeats.
-
-        A ripple of two harmonics that is taken for one leaves what looks like a further cause. One
-        that does not repeat is no ripple.
-        """
-        effect = fit.effects[-1]
-        if not fx.EFFECTS[effect].ripple or self._fitter.misfit(fit) < WORTH_A_HARMONIC:
-            return fit
-        repeats = self.gain(fit, parent).present
-        if not repeats or closed(self._fitter, fit, parent) < _WORTH_RICHER:
-            return fit
-        self._progress(f"{' + '.join(fit.effects)}, second harmonic")
-        richer = with_second_harmonic(self._fitter, fit, parent)
-        if richer is None or not self.gain(richer, fit).present:
-            return fit
-        # both by the weights of what they leave themselves
-        richer, alone = self._fitter.further(richer), self._fitter.further(fit)
-        return richer if self.gain(richer, alone).present else alone
-
     def _one_cause(self, parent: CellFit, steps: Sequence[CellFit]) -> list[str]:
         """Return what could only name a cause of the parent twice; see `ONE_CAUSE`.
 
@@ -296,7 +225,7 @@ class Extension:
         bands = [
             np.sum(weights.counts * each, axis=0) / weights.counts.sum(axis=0) for each in over
         ]
-        return not ((bands[0] > NOTHING_LEFT) & (bands[0] > _MOST * bands[1])).any()
+        return not ((bands[0] > NOTHING_LEFT) & (bands[0] > MOST * bands[1])).any()
 
     def screened(self, parent: CellFit, effects: Sequence[str]) -> dict[str, Screening]:
         """Return screenings beside a fit: of all effects the first time, then of those that count.
@@ -305,7 +234,7 @@ class Extension:
         effects may gain beside others; where a cause has closed most of the error, that is not so
         near any more, and all are screened anew. So are effects that depend on others.
         """
-        anew = self._first is None or left_of(self._fitter, parent, self._first[0]) < _OUTDATED
+        anew = self._first is None or left_of(self._fitter, parent, self._first[0]) < OUTDATED
         if self._first is not None and not anew:
             before, screened = self._first
             promise = {

@@ -13,7 +13,8 @@ import numpy as np
 from fjr_sim_node import effects as fx
 
 from ..model.rig_model import Model
-from .screening import Costs, Errors, Proposal
+from .candidates import Costs
+from .screening import Errors, Proposal
 from .search_space import Space
 
 

@@ -10,14 +10,12 @@ turn span all phases: their best combination is a seed of its own.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
-from fjr_sim_node import effects as fx
-
 from ..model.rig_model import Model
+from .candidates import Candidate, Costs, candidates, scales
 from .least_squares import Solution
 from .search_space import Space, beside
 
@@ -33,20 +31,8 @@ _Base = Literal["following", "kept", "datasheet"]
 """Base parameters beside a candidate: the parent's, as these would follow it; the parent's as they
 are; the datasheet's."""
 Errors = Callable[[Sequence[Model]], np.ndarray]
-Costs = Callable[[np.ndarray], np.ndarray]
-"""Takes errors, (models, errors) in standard deviations; returns what each costs, (models,)."""
 Proposal = tuple[float, Space, np.ndarray]
 """A starting point: what it costs, the space it lies in, the point."""
-
-
-@dataclass(frozen=True)
-class _Candidate:
-    """A seed, how it changes the errors, its linearly best size and what that would gain."""
-
-    seed: Mapping[str, float]
-    change: np.ndarray
-    size: float
-    gain: float
 
 
 class Screening:
@@ -82,7 +68,7 @@ class Screening:
         changes = errors([beside(model, seed) for seed in seeds]) - parent.residuals
         inverse = np.linalg.pinv(parent.jacobian, rcond=1e-6)
         self._points = as_they_are(points, parent, errors, costs) if points else []
-        self._candidates = _candidates(parent, seeds, changes, inverse, costs)
+        self._candidates = candidates(parent, seeds, changes, inverse, costs)
         self._seeds, self._changes = seeds, changes
         self._plain = costs(parent.residuals + changes)
         begun = float(costs(parent.residuals[None])[0])
@@ -100,7 +86,7 @@ class Screening:
         """
         inverse, changes = np.linalg.pinv(other.jacobian, rcond=1e-6), self._changes * ratio
         begun, *plain = costs(np.vstack([other.residuals, other.residuals + changes]))
-        linear = _candidates(other, self._seeds, changes, inverse, costs)[0].gain
+        linear = candidates(other, self._seeds, changes, inverse, costs)[0].gain
         return max(linear, float(begun - min(plain)))
 
     def least(self) -> float:
@@ -176,10 +162,10 @@ class _Tries:
         self._space_of, self._errors, self._costs = space_of, errors, costs
         self._largest = largest
         self._spaces: dict[int, Space] = {}
-        self._found: list[tuple[float, _Candidate, np.ndarray]] = []
+        self._found: list[tuple[float, Candidate, np.ndarray]] = []
         self._tried: set[tuple[int, float, _Base]] = set()
 
-    def run(self, tries: Sequence[tuple[_Candidate, float]], base: _Base = "following") -> None:
+    def run(self, tries: Sequence[tuple[Candidate, float]], base: _Base = "following") -> None:
         """Evaluate candidates at sizes, with base parameters of some kind."""
         most = self._largest
         within = [(c, float(np.clip(size, -most, most))) for c, size in tries if abs(size) > 1e-3]
@@ -202,7 +188,7 @@ class _Tries:
     ) -> None:
         """Take seeds that were evaluated as they are, with what they change, beside the parent."""
         for (seed, change), cost in zip(seeds, costs, strict=True):
-            one = _Candidate(seed, change, 1.0, 0.0)
+            one = Candidate(seed, change, 1.0, 0.0)
             self._found.append((float(cost), one, self._point(one, 1.0, "kept")))
         self._found.sort(key=lambda one: one[0])
 
@@ -211,9 +197,9 @@ class _Tries:
         """Whether something was tried."""
         return bool(self._found)
 
-    def best(self, most: int) -> list[_Candidate]:
+    def best(self, most: int) -> list[Candidate]:
         """Return the candidates that did best so far."""
-        order: dict[int, _Candidate] = {}
+        order: dict[int, Candidate] = {}
         for _, candidate, _ in self._found:
             order.setdefault(id(candidate.seed), candidate)
         return list(order.values())[:most]
@@ -222,12 +208,12 @@ class _Tries:
         """Return all that was tried, ascending in cost."""
         return [(cost, self._space(c), point) for cost, c, point in self._found]
 
-    def _space(self, candidate: _Candidate) -> Space:
+    def _space(self, candidate: Candidate) -> Space:
         if id(candidate.seed) not in self._spaces:
             self._spaces[id(candidate.seed)] = self._space_of(candidate.seed)
         return self._spaces[id(candidate.seed)]
 
-    def run_straightened(self, candidates: Sequence[_Candidate]) -> None:
+    def run_straightened(self, candidates: Sequence[Candidate]) -> None:
         """Evaluate candidates beside the datasheet, where the parent's parameters leave it far.
 
         A refit bends all parameters to do what a large effect does; the fit would then begin with
@@ -240,10 +226,10 @@ class _Tries:
                 sizes = sorted({candidate.size, 1.0, 2.0})
                 self.run([(candidate, size) for size in sizes], "datasheet")
 
-    def _point(self, candidate: _Candidate, size: float, base: _Base) -> np.ndarray:
+    def _point(self, candidate: Candidate, size: float, base: _Base) -> np.ndarray:
         """Return the seed with its sizes scaled, and the parameters of the parent."""
         space, parents = self._space(candidate), self._parent.x.size
-        seed = {n: v * size if _scales(n) else v for n, v in candidate.seed.items()}
+        seed = {n: v * size if scales(n) else v for n, v in candidate.seed.items()}
         point = space.point(beside(self._model, seed))
         if base == "datasheet":
             point[: len(space.nominal)] = 0.0
@@ -251,77 +237,3 @@ class _Tries:
             step = self._inverse @ -(self._parent.residuals + size * candidate.change)
             point[:parents] += np.clip(step, -_FOLLOW, _FOLLOW)
         return np.clip(point, *space.bounds())
-
-
-def _candidates(
-    parent: Solution,
-    seeds: Sequence[Mapping[str, float]],
-    changes: np.ndarray,
-    inverse: np.ndarray,
-    costs: Costs,
-) -> list[_Candidate]:
-    """Return one candidate for each seed, or for each pair of seeds a quarter turn apart.
-
-    Args:
-        parent: of the seeds.
-        seeds: starting values.
-        changes: (seeds, errors), what each changes.
-        inverse: of the parent's Jacobian.
-        costs: what error vectors cost.
-
-    Returns:
-        The candidates, descending in gain.
-    """
-    own = changes - (changes @ inverse.T) @ parent.jacobian.T  # what the parent cannot follow
-    found = []
-    for members in by_shape(seeds).values():
-        weights, *_ = np.linalg.lstsq(own[members].T, -parent.residuals, rcond=1e-9)
-        if len(members) == 1 and not any(map(_scales, seeds[members[0]])):
-            weights = np.ones(1)
-        before, after = costs(
-            np.array([parent.residuals, parent.residuals + weights @ own[members]])
-        )
-        gain = float(before - after)
-        if len(members) == 1:
-            seed, size = seeds[members[0]], float(weights[0])
-            if size < 0.0 and not _may_be_negative(seed):
-                size, gain = 1.0, 0.0
-            found.append(_Candidate(seed, changes[members[0]], size, gain))
-            continue
-        size = float(np.hypot(*weights)) or 1.0
-        name = _phase_name(seeds[members[0]])
-        assert name is not None  # two seeds of one shape differ in it
-        phase = {name: float(np.arctan2(weights[1], weights[0]))}
-        change = (weights @ changes[members]) / size
-        found.append(_Candidate({**seeds[members[0]], **phase}, change, size, gain))
-    return sorted(found, key=lambda candidate: -candidate.gain)
-
-
-def by_shape(seeds: Sequence[Mapping[str, float]]) -> dict[tuple, list[int]]:
-    """Group seeds that differ only in the phases 0 and a quarter turn, in this order."""
-    groups: dict[tuple, list[int]] = {}
-    for index, seed in enumerate(seeds):
-        phase = _phase_name(seed)
-        quarter = phase is not None and seed[phase] in (0.0, np.pi / 2)
-        key = tuple((n, v) for n, v in seed.items() if not (quarter and n == phase))
-        groups.setdefault((key, None if quarter else index), []).append(index)
-    return groups
-
-
-def _phase_name(seed: Mapping[str, float]) -> str | None:
-    names = [name for name in seed if fx.parameter(name).role == "angle"]
-    return names[0] if names else None
-
-
-def _may_be_negative(seed: Mapping[str, float]) -> bool:
-    return all(fx.parameter(name).may_be_negative for name in seed if is_size(name))
-
-
-def _scales(name: str) -> bool:
-    """Tell whether what an effect does grows with a parameter, by its full name."""
-    return fx.parameter(name).role in ("size", "harmonic")
-
-
-def is_size(name: str) -> bool:
-    """Tell whether a parameter, by its full name, switches its effect or a part of it."""
-    return fx.parameter(name).role in ("size", "limit", "harmonic")

@@ -19,15 +19,13 @@ from gap_diagnosis.verdict.kept_causes import (
     _bearing,
     _bears,
     _begun_anew,
-    _bent,
-    _changing,
     _guesses,
-    _kin,
     _lacked,
     _one_by_one,
     _twice,
     kept,
 )
+from gap_diagnosis.verdict.not_named import _bent, _changing, _kin
 from gap_diagnosis.verdict.tested_causes import LEAST_PRESENT, causes_with_tests
 from gap_diagnosis.which import stepwise
 from gap_diagnosis.which.cell_fits import CellFitter

@@ -1,0 +1,62 @@
+"""Sentences on causes that are not named though they pass some tests or close much of the gap."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from fjr_sim_node import effects as fx
+
+from ..outcome.verdict_words import explanation
+from .tested_causes import Tested
+
+_MUCH = 0.5
+"""Share of the gap that a cause closes, from which on it is said why it is not named."""
+
+
+def why_not(tested: Tested) -> list[str]:
+    """Return why a cause that closes much is not named; nothing of one that closes little."""
+    return [*_changing(tested), *_kin(tested), *_bent(tested)]
+
+
+def unsure(doubted: Mapping[str, float]) -> list[str]:
+    """Return the sentence on causes that passed all tests, but not surely enough for a third."""
+    if not doubted:
+        return []
+    shown = ", ".join(f"{explanation([effect])} ({p:.0%})" for effect, p in doubted.items())
+    return [
+        f"What may be there as well, but is not sure enough to be named beside two others: {shown}."
+    ]
+
+
+def _changing(tested: Tested) -> list[str]:
+    """Return the sentence on a cause that closes much, but not with the same size at all levels."""
+    if tested.invariant or not tested.gain.present or not tested.share.value >= _MUCH:
+        return []
+    return [
+        f"{explanation([tested.effect]).capitalize()} would close {tested.share.value:.0%} of what "
+        "the refit left, but not with the same size at all levels "
+        f"(p = {tested.invariance_p:.1g}), so it is not named: what is there follows another law."
+    ]
+
+
+def _kin(tested: Tested) -> list[str]:
+    """Return the sentence on a cause that is not named since most of the error stays beside it."""
+    if not tested.nearest_kin:
+        return []
+    return [
+        f"{explanation([tested.effect]).capitalize()} would close {tested.share.value:.0%} of what "
+        "the refit left, and does so on data that no fit has seen, but most of the error stays, so "
+        "it is not named: what is there may be of a law whose nearest kin in the catalogue it is."
+    ]
+
+
+def _bent(tested: Tested) -> list[str]:
+    """Return the sentence on a cause that is not named since its law ended at a limit."""
+    if not tested.of_another_form or not tested.share.value >= _MUCH:
+        return []
+    parameter = fx.parameter(str(tested.bounded))
+    return [
+        f"{explanation([tested.effect]).capitalize()} would close {tested.share.value:.0%} of what "
+        f"the refit left, but its {parameter.name.split('.')[1]} ended where a fit may go no "
+        "further, so it is not named: what is there is akin to it, of another form."
+    ]
