@@ -22,19 +22,13 @@ from fjr_records.records import Record, RecordSet
 
 from .lapped import lapped, samples_of
 from .octaves import Octaves, lines_with_signal
-from .parts import Purpose, cut, joined, spans_of
+from .parts import Purpose, cut, hop_of, joined, spans_of
 from .quasi_static import QuasiStaticSimulator, Stations
 from .record_rig import RecordSimulator
 from .rig_model import Model
 from .steady_runs import SteadyRuns
 from .twist import twist_of
 
-WINDOWS = 24
-"""Windows into which the shortest record is cut, at least; twice as many where a level has a single
-record, since that serves all purposes, and a test of few blocks shows nothing."""
-_LONGEST_WINDOW_S = 4.0
-_LONG = 160  # samples: longer hops are multiples of 16, which transforms fast
-_SLOW_WINDOWS = 96
 _SLIGHT = 0.01  # of the torque: in a slow motion, less of it says nothing
 _SIMULATION = 1e-3  # error of the simulation itself, of its torque or of its motion
 _DIVERGED = 1e6
@@ -68,17 +62,8 @@ class Evidence:
         """
         self.slow = slow is not None
         self.records = records = records if slow is None else slow.records
-        rate = records.sample_rate_hz
         run_in = records.run_in if isinstance(records, SteadyRuns) else 0
-        shortest = min(r.samples for r in records.records) - run_in
-        levels = [r.level for r in records.records]
-        alone = any(levels.count(level) == 1 for level in levels)
-        windows = 2 * WINDOWS if alone else WINDOWS
-        if slow is None:
-            hop = min(shortest / (windows + 1), 0.5 * _LONGEST_WINDOW_S * rate)
-        else:
-            hop = shortest / (_SLOW_WINDOWS + 1)
-        self.hop = max(int(hop - hop % (16 if hop >= _LONG else 2)), 8)
+        self.hop = hop_of(records, run_in, self.slow)
         self._measured = [lapped(r.position, self.hop) for r in records.records]
         self.simulator: RecordSimulator | QuasiStaticSimulator
         if slow is not None:

@@ -14,6 +14,12 @@ from .lapped import windows_in
 
 Purpose = Literal["fit", "select", "report"]
 
+WINDOWS = 24
+"""Windows into which the shortest record is cut, at least; twice as many where a level has a single
+record, since that serves all purposes, and a test of few blocks shows nothing."""
+_LONGEST_WINDOW_S = 4.0
+_LONG = 160  # samples: longer hops are multiples of 16, which transforms fast
+_SLOW_WINDOWS = 96
 _WINDOWS_PER_BLOCK = 2
 _PURPOSES: tuple[Purpose, ...] = ("fit", "select", "report")
 _CYCLE: tuple[Purpose, ...] = ("fit", "select", "fit", "report")
@@ -38,6 +44,25 @@ class Part:
     windows: slice
     purpose: Purpose
     stretch: int
+
+
+def hop_of(records: RecordSet, run_in: int, slow: bool) -> int:
+    """Return half the length of the windows into which records are cut, samples, even.
+
+    Args:
+        records: the records.
+        run_in: samples at the start of each that belong to no part.
+        slow: whether they are compared by torque alone.
+    """
+    shortest = min(r.samples for r in records.records) - run_in
+    levels = [r.level for r in records.records]
+    alone = any(levels.count(level) == 1 for level in levels)
+    windows = 2 * WINDOWS if alone else WINDOWS
+    if slow:
+        hop = shortest / (_SLOW_WINDOWS + 1)
+    else:
+        hop = min(shortest / (windows + 1), 0.5 * _LONGEST_WINDOW_S * records.sample_rate_hz)
+    return max(int(hop - hop % (16 if hop >= _LONG else 2)), 8)
 
 
 def cut(records: RecordSet, hop: int, run_in: int = 0) -> list[Part]:
