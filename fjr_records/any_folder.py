@@ -64,8 +64,8 @@ def open_folder(
         if override != Override() or any(r.experiment is not None for r in readers):
             raise
         records = read_records(folder, signal_map, resampling=resampling)
-        why = str(error).partition("; ")[0].rstrip(".")
-        return replace(records, notes=(f"{NOT_PERIODIC} ({why}).", *records.notes))
+        why = f"{NOT_PERIODIC} ({str(error).rstrip('.')})."
+        return replace(records, notes=(why, *records.notes))
 
 
 def _hold_records(folder: Path | str, readers: Sequence[BagReader]) -> bool:
