@@ -110,11 +110,18 @@ class ControllerNode(runtime.RigNode):
         self._loop.end(experiment.samples)
 
     def _look_for_others(self) -> None:
-        """Refuse a second publisher: in real time each message looks for one, too."""
+        """Refuse a second publisher: in real time each message looks for one, too.
+
+        In real time another one in the first one's place is refused as well, while a run goes on.
+        """
         for source in (self._reference, self._position):
             if self._real_time:
                 source.look()
                 self._refuse_second(source)
+                if self._law.safety.held:
+                    source.forget()
+                elif replaced := source.replaced():
+                    self._trip(replaced)
             elif others := source.others():
                 raise InputError(others)
 
@@ -140,6 +147,8 @@ class ControllerNode(runtime.RigNode):
         self._answer()
 
     def _leave_run(self) -> None:
+        for source in (self._reference, self._position):
+            source.forget()
         if self._real_time:
             self._loop.leave_run(self.values)
             keep_pauses_out()

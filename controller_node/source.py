@@ -28,6 +28,7 @@ class Source:
         self.decode = JointStateReader(signal.field).decode
         self._node = node
         self._count = 0
+        self._first: str | None = None  # whom the run under way began with
         self.names: list[str] = []
 
     @property
@@ -46,6 +47,26 @@ class Source:
             f"{self.subscription.topic_name} has {count} publishers ({self.said}); leave one of "
             "them, a killed one is forgotten after 10 s"
         )
+
+    def replaced(self) -> str | None:
+        """Return that another node publishes than when the run began; None if not.
+
+        A node that was killed and started again is no other.
+        """
+        if len(self.names) != 1:
+            return None
+        (now,) = self.names
+        self._first = self._first or now
+        if now == self._first:
+            return None
+        return (
+            f"{self.subscription.topic_name} comes from {now} now, not from {self._first} as when "
+            "the run began; begin a new run with one of them"
+        )
+
+    def forget(self) -> None:
+        """Let another node publish from now on: no run is under way, or a new one begins."""
+        self._first = None
 
     def look(self) -> None:
         """Ask the graph who publishes."""

@@ -77,8 +77,8 @@ class Uncertainty:
         total = float(shares.sum())
         if not total > 0:
             return 0.0, 1e6
-        noisy = float((shares**2 / (2.0 * (self.degrees + 1.0))).sum())
-        return self.widening * np.sqrt(total), max(total**2 / noisy, 1.0)
+        noisy = float(((shares / total) ** 2 / (2.0 * (self.degrees + 1.0))).sum())
+        return self.widening * np.sqrt(total), max(1.0 / noisy, 1.0)
 
     def interval(self, value: float, gradient: np.ndarray, unit: str) -> Interval:
         """Return a quantity with its 95 % interval."""

@@ -24,8 +24,9 @@ def data_notes(recorded: RecordedExperiment, noise: NoiseLevels | None) -> list[
         )
     if min(counts) < 2:
         notes.append(
-            "A level has one realization only: nothing of it can be held out, and drift between "
-            "bags cannot be seen there; record two or more with other phases."
+            "A level has one realization only: no whole run of it can be held out, so blocks of "
+            "the run are, and drift between bags cannot be seen there; record two or more with "
+            "other phases."
         )
     if len(counts) < 2:
         notes.append(

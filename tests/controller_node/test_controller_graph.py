@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from typing import Any
 
 import pytest
@@ -57,14 +58,14 @@ class Joint:
         answer = self.peer.call(Trigger, f"controller/{service}", Trigger.Request())
         return str(answer.message)
 
+    def trips(self) -> list[str]:
+        """Return what /diagnostics has said of trips so far."""
+        each = (status for array in self.said for status in array.status)
+        return [s.message for s in each if s.message.startswith("tripped: ")]
+
     def tripped(self) -> str:
         """Wait for a trip; return what /diagnostics says of it."""
-
-        def trips() -> list[str]:
-            each = (status for array in self.said for status in array.status)
-            return [s.message for s in each if s.message.startswith("tripped: ")]
-
-        return str(self.peer.spin_until(trips, "a trip on /diagnostics")[-1])
+        return str(self.peer.spin_until(self.trips, "a trip on /diagnostics")[-1])
 
     def rests(self) -> None:
         """See the torque go to zero and stay there, in a process that lives."""
@@ -123,6 +124,29 @@ def test_a_second_publisher_trips_and_is_named(start, peer, topic):
     peer.spin_until(publisher.get_subscription_count, "the controller")
     said = joint.tripped()
     assert f"/rig/{topic} has 2 publishers" in said
+    joint.rests()
+    other.destroy_node()
+
+
+@pytest.mark.parametrize("topic", ["reference", "motor_position"])
+def test_a_publisher_that_takes_the_place_of_the_first_one_in_a_run_trips(start, peer, topic):
+    import rclpy
+    from sensor_msgs.msg import JointState
+
+    from fjr_interface.ros import runtime
+
+    joint = Joint(start, peer)
+    until = time.monotonic() + 1.5  # the controller looks twice a second who publishes
+    while time.monotonic() < until:
+        joint.play(1)
+    own = "reference" if topic == "reference" else "position"
+    peer.node.destroy_publisher(getattr(joint, own))
+    other = rclpy.create_node("intruder", namespace="/rig", context=peer.context)
+    publisher = other.create_publisher(JointState, topic, runtime.SIGNAL_QOS)
+    peer.spin_until(publisher.get_subscription_count, "the controller")
+    setattr(joint, own, publisher)
+    said = peer.spin_until(lambda: joint.play(1) and joint.trips(), "a trip")[-1]
+    assert f"/rig/{topic} comes from /rig/intruder now, not from /rig/peer" in said
     joint.rests()
     other.destroy_node()
 
