@@ -215,6 +215,7 @@ class RealTimeController:
         released = self._law.safety.release()
         self._unreferenced_s, self._pace = 0.0, Pace()
         if released and self._watched:
+            self._pacing = False  # a position that does not come now trips again
             self.due_ns = now_ns + self._timeout_ns
         return released
 

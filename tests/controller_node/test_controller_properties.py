@@ -240,6 +240,44 @@ class Hostile(RuleBasedStateMachine):
         self.release()
         self.positions(samples, sign * 0.05, 0.0, 1, MS)
 
+    # One limit is passed, nothing else: no other guard may stand in for the one that is asked.
+
+    @rule(ahead=st.integers(14, 99) | st.integers(14, 10**6))
+    def well_then_one_position_ahead(self, ahead: int) -> None:
+        self.leave_run()  # in a new run no earlier lateness excuses the stamps
+        self.stamp = 0
+        self.run_well(30, 1)
+        going = self.reason is None and not self.law.safety.held
+        self.let_pass(MS)
+        self.send(self.stamp + ahead * MS, 0.0)
+        assert not going or self.reason is not None
+
+    @rule(stride=st.integers(4, 8))
+    def well_then_stamps_run_fast(self, stride: int) -> None:
+        self.run_well(30, -1)
+        for _ in range(150):
+            self.let_pass(MS)
+            stamp = self.stamp + stride * MS
+            self.refer(stamp, 0.0)
+            self.send(stamp, 0.0)
+
+    @rule(
+        beyond=st.sampled_from([1e300, -1e308, 1.1 * REFERENCE, -1.1 * REFERENCE, math.nan]),
+    )
+    def well_then_an_absurd_reference(self, beyond: float) -> None:
+        self.run_well(30, 1)
+        self.let_pass(MS)
+        self.refer(self.stamp + MS, beyond)
+        self.send(self.stamp + MS, 0.0)
+
+    @rule(sign=st.sampled_from([1, -1]))
+    def well_then_slowly_out_of_range(self, sign: int) -> None:
+        self.run_well(30, sign)
+        for k in range(1, 130):
+            self.let_pass(MS)
+            self.refer(self.stamp + MS, 0.05 * sign)
+            self.send(self.stamp + MS, sign * 3e-3 * k)
+
     @rule()
     def release(self) -> None:
         was, self.reason = self.reason, None
@@ -349,6 +387,18 @@ def test_stamps_that_have_moved_are_followed_after_a_release():
     stream.loop.release(stream.now)
     assert stream.play(1200, 200) > 0.0 and stream.play(1201, 201) > 0.0
     assert stream.law.safety.tripped is None
+
+
+def test_after_a_release_on_the_way_to_zero_missing_positions_trip_again():
+    stream = Stream(torque_soft_start_s=0.0)
+    for k in range(1, 50):
+        stream.play(k)
+    assert stream.play(50 + 50, 50) is None  # ahead of the clock: the own clock says the torques
+    stream.loop.serve(stream.now + 2 * MS)
+    stream.loop.release(stream.now + 2 * MS)
+    assert stream.law.safety.tripped is None
+    stream.loop.serve(stream.now + 3 * MS + round(TIMEOUT * 1e9))
+    assert stream.law.safety.tripped == f"no position for {TIMEOUT:g} s"
 
 
 def test_an_absurd_reference_trips_and_winds_nothing_up():
