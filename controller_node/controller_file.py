@@ -30,6 +30,7 @@ from pathlib import Path
 from typing import Any
 
 from fjr_interface.bags.plain_yaml import load_plain_yaml
+from fjr_interface.bounded_yaml import YamlProblem
 from fjr_kit.errors import InputError
 
 from .structures import (
@@ -54,6 +55,9 @@ def read_controller(path: Path) -> AnyStructure:
         content = load_plain_yaml(path.read_bytes().decode())
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}).") from None
+    except YamlProblem as problem:
+        place = "" if problem.line is None else f"line {problem.line}: "
+        raise InputError(f"{path}: {place}{problem}.") from None
     except (ValueError, RecursionError):
         raise InputError(f"{path}: is neither YAML nor JSON; write the controller anew.") from None
     return structure_of(content, f"{path}: controller")

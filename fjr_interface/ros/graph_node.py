@@ -107,12 +107,13 @@ class GraphNode(Node):
             node: the node of the rig that owes it.
             at_first: `writers` of that node when the run began.
         """
-        again, now = "`fjr reset` plays the realization from its beginning", self.writers(node)
+        again = "`fjr reset` plays the realization from its beginning"
+        writers = {each: self.writers(each) for each in (node, *WRITERS)}
         if twice := self._published_twice():
             return Lack(what, f"{twice}: end all but one of them, then {again}")
-        if not now:
-            return Lack(what, f"{start(node)}, then {again}")
-        if now - at_first:
+        if absent := [each for each, found in writers.items() if not found]:
+            return Lack(what, f"{start(*absent)}, then {again}")
+        if writers[node] - at_first:
             return Lack(what, f"the {node} was started in the middle of the run: {again}")
         return Lack(what, f"{again}; if that does not help, {start(node)} anew")
 

@@ -188,8 +188,9 @@ def _numbers(path: Path, name: str, column: np.ndarray, *, holes: bool = False) 
     numbers = column.astype(float).ravel()
     bad = np.flatnonzero(~(np.abs(numbers) <= LARGEST) & ~(holes & np.isnan(numbers)))
     if bad.size:
+        more = f" and {bad.size - 1} more such values" if bad.size > 1 else ""
         raise InputError(
-            f"{path}: {name} holds {numbers[bad[0]]} at sample {bad[0]} and {bad.size - 1} more "
-            "such values; repair or cut the record."
+            f"{path}: {name} holds {numbers[bad[0]]} at sample {bad[0]}{more}; repair or cut the "
+            "record."
         )
     return numbers

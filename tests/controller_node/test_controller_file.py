@@ -110,9 +110,9 @@ def test_unknown_gains_stay_and_are_listed(tmp_path):
         ("kind: pd\np: 1\nq: 2\n", r"controller\.q: is not known here"),
         ("kind: pd\np: 1\ntorque_limit_nm: -1\n", r"controller\.torque_limit_nm"),
         ("kind: pd\np: 1\nd: 1\nn: 0\n", r"controller\.n"),
-        ("kind: [pd\n", "neither YAML nor JSON"),
-        ("kind: &a pd\np: *a\n", "neither YAML nor JSON"),
-        ("\x00\xff", "neither YAML nor JSON"),
+        ("kind: [pd\n", "this is not YAML"),
+        ("kind: &a pd\np: *a\n", "line 2: YAML aliases .* are not read: write the value out"),
+        ("\x00\xff", "control characters are not allowed"),
         (
             "kind: transfer_function\nnumerator: [1]\ndenominator: [1, -2]\n",
             r"controller has a pole of magnitude 2 outside",

@@ -297,7 +297,7 @@ TIMED = (*SI_MAP, "time=t")
         ({**record(), "y": np.zeros(799)}, options(), "r has 800 samples, but y has 799"),
         ({**record(), "y": np.array(["a", "b"])}, options(), "y does not hold real numbers"),
         ({**record(), "y": np.zeros(800, complex)}, options(), "y does not hold real numbers"),
-        (spoiled("u", 70, math.nan), options(), "u holds nan at sample 70 and 0 more"),
+        (spoiled("u", 70, math.nan), options(), "u holds nan at sample 70; repair"),
         (spoiled("y", 3, -math.inf), options(), "y holds -inf at sample 3"),
         (spoiled("y", 3, 1e308), options(), r"y holds 1e\+308 at sample 3"),
         (spoiled("r", 3, -1e200), options(), r"r holds -1e\+200 at sample 3"),
