@@ -2,10 +2,11 @@
 
 A folder of bags goes in; grid, levels, realizations and their samples come out, the same for
 analysis and diagnosis. Begin with `experiment_folder.open_experiment`: what the bags are together,
-`described` by themselves or `undescribed` and found in their signals (`discover`). `realization`
-reduces a bag to spectra in one pass, `periodic` holds an experiment whole, cut into its periods,
-`records` whatever does not repeat; `lines`, `spectra`, `noise` and `encoder_step` are what these
-rest on. `importers` turn foreign files into bags (`importers.importer.import_files`).
+`described` by themselves or `undescribed` and found in their signals (`discover`); `experiment_bag`
+is one of them. `realization` reduces a bag to spectra in one pass, `periodic` holds an experiment
+whole, cut into its periods, `records` whatever does not repeat; `lines`, `spectra`, `noise`,
+`record_noise` and `encoder_step` are what these rest on. `driven` and `units` doubt wrong signs and
+units. `importers` turn foreign files into bags (`importers.importer.import_files`).
 
     >>> from fjr_records import open_experiment, read_experiment
     >>> [(bag.level, bag.realization) for bag in open_experiment("rig").bags]
