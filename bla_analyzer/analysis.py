@@ -7,19 +7,15 @@ What the excitation is decides the way: multisines go to `periodic_analysis`, al
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import get_args
 
-from fjr_interface.bags.reader import DEFAULT, SignalMap, find_bags
-from fjr_interface.experiment import RecordDescription
+from fjr_interface.bags.signals import DEFAULT, SignalMap
 from fjr_interface.resampling.accuracy import Resampling
-from fjr_interface.resampling.resampled_reader import open_bag
 from fjr_kit.errors import InputError
-from fjr_records.discover import NoPeriodError
+from fjr_records.any_folder import NOT_PERIODIC, open_folder
 from fjr_records.experiment_bag import Override
-from fjr_records.experiment_folder import ExperimentFolder, open_experiment
-from fjr_records.records import read_records, reference_optional
+from fjr_records.records import RecordSet
 
 from .compare.metrics import ReferenceModel
 from .periodic_analysis import Progress, analyze_periodic
@@ -61,50 +57,24 @@ def analyze(
     """
     if method not in (None, *get_args(Method)):
         raise InputError(f"method must be robust, fast or local, not {method!r}.")
-    experiment = _periodic(folder, signal_map, override, resampling)
-    if isinstance(experiment, NoPeriodError):
-        if method in ("robust", "fast"):
-            raise experiment
-        sources = replace(signal_map, link=None)
-        records = read_records(folder, sources, resampling=resampling)
-        records = replace(records, notes=(_not_periodic(experiment), *records.notes))
-        return analyze_records(records, models)
+    opened = open_folder(folder, signal_map, override=override, resampling=resampling)
+    if isinstance(opened, RecordSet):
+        return _of_records(opened, method, models)
     has_reference = signal_map.reference is not None
-    return analyze_periodic(experiment, method, models, has_reference, progress)
+    return analyze_periodic(opened, method, models, has_reference, progress)
 
 
-def _periodic(
-    folder: Path | str,
-    signal_map: SignalMap,
-    override: Override | None,
-    resampling: Resampling | None,
-) -> ExperimentFolder | NoPeriodError:
-    """Return the experiment, or why it is none of multisines.
-
-    Raises:
-        InputError: bags of both kinds, or bags that are damaged.
-    """
-    optional = reference_optional(signal_map)
-    readers = [open_bag(bag, optional, resampling) for bag in find_bags(folder)]
-    records = [r.path.name for r in readers if isinstance(r.experiment, RecordDescription)]
-    if records:
-        if len(records) < len(readers):
-            other = next(r.path.name for r in readers if r.path.name not in records)
-            raise InputError(
-                f"{folder}: {records[0]} is a record that is not periodic but {other} is a "
-                "multisine; put them into separate folders."
-            )
-        return NoPeriodError(
-            f"{folder}: described as records that are not periodic; robust and fast method are for "
-            "multisines, so leave the method out."
-        )
+def _of_records(
+    records: RecordSet, method: Method | None, models: Sequence[ReferenceModel]
+) -> Result:
+    """Analyze records; an error says as well why they are not taken as periodic."""
     try:
-        return open_experiment(folder, signal_map, override=override, resampling=resampling)
-    except NoPeriodError as error:
-        if any(r.experiment is not None for r in readers) or override not in (None, Override()):
-            raise
-        return error
-
-
-def _not_periodic(why: NoPeriodError) -> str:
-    return f"Not analysed as periodic: {str(why).partition('; ')[0].rstrip('.')}."
+        if method in ("robust", "fast"):
+            raise InputError(
+                f"{records.source}: holds records that are not periodic, and the {method} method "
+                "is for multisines; leave the method out."
+            )
+        return analyze_records(records, models)
+    except InputError as error:
+        why = [note for note in records.notes if note.startswith(NOT_PERIODIC)]
+        raise InputError(" ".join([str(error), *why])) from None

@@ -71,10 +71,10 @@ def described(
                     f"{readers[0].path.name} and {reader.path.name} differ in {field}; put "
                     "them into separate folders."
                 )
-    if override.period_samples not in (None, first.samples_per_period):
+    if override.samples_per_period not in (None, first.samples_per_period):
         raise InputError(
-            f"{readers[0].path.name}: period_samples {override.period_samples} contradicts the "
-            f"description, which says {first.samples_per_period}; leave it out."
+            f"{readers[0].path.name}: samples_per_period {override.samples_per_period} contradicts "
+            f"the description, which says {first.samples_per_period}; leave it out."
         )
     total = first.transient_periods + first.periods
     transient, periods = override.kept(total, first.transient_periods)

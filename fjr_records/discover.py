@@ -24,7 +24,7 @@ LINE_GAP = 3.0
 SETTLED = 0.01
 """Difference of y from its last period, relative to its rms, below which a period is settled."""
 
-_MEND = "give period_samples, or add an experiment description"
+_MEND = "give samples_per_period, or add an experiment description"
 
 
 class NoPeriodError(InputError):
@@ -64,7 +64,7 @@ def read_prefix(blocks: Iterable[Samples]) -> tuple[np.ndarray, np.ndarray, int]
 
 
 def discover(
-    name: str, reference: np.ndarray, position: np.ndarray, period_samples: int | None = None
+    name: str, reference: np.ndarray, position: np.ndarray, samples_per_period: int | None = None
 ) -> Found:
     """Find period, excited lines and transient.
 
@@ -72,13 +72,13 @@ def discover(
         name: name of the bag, for messages.
         reference: r, (samples,) in rad.
         position: y, (samples,) in rad.
-        period_samples: N, if it is known.
+        samples_per_period: N, if it is known.
 
     Raises:
         NoPeriodError: the reference is constant, does not repeat, its period is not a whole number
             of samples, or its lines do not stand out.
     """
-    period = period_samples or find_period(name, reference)
+    period = samples_per_period or find_period(name, reference)
     count = reference.size // period
     if count < 1:
         raise InputError(f"{name}: holds fewer than one period of {period} samples; record more.")
@@ -86,7 +86,7 @@ def discover(
     transient = find_transient(position[: count * period].reshape(count, period))
     excited, amplitudes = find_lines(name, periods[transient:].mean(axis=0))
     divisor = int(np.gcd.reduce(excited))
-    if divisor > 1 and period_samples is None:
+    if divisor > 1 and samples_per_period is None:
         if period % divisor:
             raise _not_whole(name, period / divisor)
         return discover(name, reference, position, period // divisor)

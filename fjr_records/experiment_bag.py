@@ -8,6 +8,7 @@ from fjr_interface.bags.reader import BagReader
 from fjr_interface.experiment import Experiment
 from fjr_kit.errors import InputError
 
+from .discover import NoPeriodError
 from .lines import Grid
 
 
@@ -16,18 +17,18 @@ class Override:
     """What the user sets instead of what the bags say; None leaves it.
 
     Attributes:
-        period_samples: N.
+        samples_per_period: N.
         transient_periods: periods to discard.
         periods: P to keep.
     """
 
-    period_samples: int | None = None
+    samples_per_period: int | None = None
     transient_periods: int | None = None
     periods: int | None = None
 
     def check(self) -> None:
         """Raise InputError for a number below the least that makes sense."""
-        for field, least in (("period_samples", 2), ("transient_periods", 0), ("periods", 1)):
+        for field, least in (("samples_per_period", 2), ("transient_periods", 0), ("periods", 1)):
             value = getattr(self, field)
             if value is not None and value < least:
                 raise InputError(f"{field} must be {least} or more, not {value}.")
@@ -40,13 +41,13 @@ class Override:
             transient: how many of them are transient as far as the bags say.
 
         Raises:
-            InputError: the bags hold too few.
+            NoPeriodError: the bags hold too few.
         """
         if self.transient_periods is not None:
             transient = self.transient_periods
         periods = total - transient if self.periods is None else self.periods
         if periods < 1 or transient + periods > total:
-            raise InputError(
+            raise NoPeriodError(
                 f"The bags hold {total} periods, too few for {transient} transient periods and "
                 f"{max(periods, 1)} to keep; lower transient_periods or periods."
             )

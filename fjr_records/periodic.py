@@ -14,7 +14,7 @@ from fjr_interface.resampling.accuracy import Resampling
 from fjr_kit.errors import InputError
 
 from .experiment_bag import ExperimentBag, Override
-from .experiment_folder import open_experiment
+from .experiment_folder import ExperimentFolder, open_experiment
 from .records import Record, RecordSet, reference_optional
 from .spectra import line_spectrum
 
@@ -158,11 +158,20 @@ def read_experiment(
         resampling: how to bring unevenly sampled bags onto an even grid; None refuses them.
 
     Raises:
-        InputError: see `open_experiment`; or a bag that is damaged further on, or too short.
+        InputError: see `open_experiment` and `whole`.
     """
     opened = open_experiment(
         folder, reference_optional(signal_map), override=override, resampling=resampling
     )
+    return whole(opened)
+
+
+def whole(opened: ExperimentFolder) -> RecordedExperiment:
+    """Read all bags of an experiment whole.
+
+    Raises:
+        InputError: a bag that is damaged further on, or too short.
+    """
     realizations = tuple(_cut(bag) for bag in opened.bags)
     return RecordedExperiment(opened.source, realizations, opened.notes)
 

@@ -9,9 +9,8 @@ import numpy as np
 
 from fjr_interface.bags.reader import BagReader
 from fjr_interface.experiment import Experiment
-from fjr_kit.errors import InputError
 
-from .discover import Found, discover, read_prefix
+from .discover import Found, NoPeriodError, discover, read_prefix
 from .experiment_bag import ExperimentBag, Override, Understood
 from .lines import Grid, classify
 from .realization import signal_blocks
@@ -25,14 +24,14 @@ def undescribed(readers: Sequence[BagReader], override: Override) -> Understood:
     """Return what bags without a description are together, found in their signals.
 
     Raises:
-        InputError: no period can be found, or bags that do not belong to one experiment, naming two
-            of them.
+        NoPeriodError: no period can be found, bags that do not belong to one experiment, naming two
+            of them, or hold too few periods.
     """
     found: list[Found] = []
     totals = []
     for reader in readers:
         r, y, samples = read_prefix(signal_blocks(reader, BLOCK))
-        found.append(discover(reader.path.name, r, y, override.period_samples))
+        found.append(discover(reader.path.name, r, y, override.samples_per_period))
         totals.append(samples // found[-1].samples_per_period)
     first = found[0]
     for reader, other in zip(readers, found, strict=True):
@@ -42,7 +41,7 @@ def undescribed(readers: Sequence[BagReader], override: Override) -> Understood:
             not (rates_agree and lines_agree)
             or other.samples_per_period != first.samples_per_period
         ):
-            raise InputError(
+            raise NoPeriodError(
                 f"{readers[0].path.name} and {reader.path.name} differ in sample rate, period or "
                 "excited lines; put them into separate folders."
             )

@@ -8,13 +8,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from fjr_interface.bags.reader import DEFAULT, BagReader, SignalMap, find_bags
-from fjr_interface.experiment import RecordDescription
+from fjr_interface.bags.signals import DEFAULT, SignalMap
 from fjr_interface.resampling.accuracy import Resampling
-from fjr_kit.errors import InputError
-from fjr_records.experiment_folder import Override
-from fjr_records.periodic import RecordedExperiment, read_experiment
-from fjr_records.records import RecordSet, read_records, reference_optional
+from fjr_records.any_folder import open_folder
+from fjr_records.experiment_bag import Override
+from fjr_records.periodic import RecordedExperiment, whole
+from fjr_records.records import RecordSet, reference_optional
 
 from . import further_looks
 from .investigation import Investigation, Order, investigate_runs
@@ -83,27 +82,13 @@ def read_any(
         as_record: whether to take steady periods as records, too.
 
     Raises:
-        InputError: see `read_experiment` and `read_records`; or periods that are set for records.
+        InputError: see `open_folder` and `whole`.
     """
-    periods = override if override not in (None, Override()) else None
     optional = reference_optional(signal_map)
-    kinds = [BagReader(bag, optional).experiment for bag in find_bags(folder)]
-    if as_record or any(isinstance(kind, RecordDescription) for kind in kinds):
-        if periods is not None:
-            raise InputError(
-                f"{folder}: records are not cut into periods; leave out the number of periods, of "
-                "transient periods and of samples per period."
-            )
-        return read_records(folder, signal_map, resampling=resampling)
-    try:
-        return read_experiment(folder, signal_map, override=override, resampling=resampling)
-    except InputError as error:
-        if periods is not None or any(kind is not None for kind in kinds):
-            raise
-        records = read_records(folder, signal_map, resampling=resampling)
-        why = str(error).split(";")[0].rstrip(".")
-        note = f"Diagnosed as records, since no steady periods were found ({why})."
-        return replace(records, notes=(note, *records.notes))
+    opened = open_folder(
+        folder, optional, override=override, resampling=resampling, as_records=as_record
+    )
+    return opened if isinstance(opened, RecordSet) else whole(opened)
 
 
 def investigate(

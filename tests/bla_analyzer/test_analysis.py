@@ -18,6 +18,7 @@ from fjr_interface.bags.writer import BagWriter
 from fjr_interface.experiment import Experiment
 from fjr_interface.topics import SIGNALS
 from fjr_kit.errors import InputError
+from fjr_records.any_folder import NOT_PERIODIC
 from fjr_records.discover import discover
 from fjr_records.experiment_bag import Override
 from fjr_records.lines import Grid
@@ -193,10 +194,10 @@ def test_override_takes_other_periods(tmp_path):
     [
         (Override(periods=0), "periods must be 1 or more, not 0."),
         (Override(transient_periods=-1), "transient_periods must be 0 or more, not -1."),
-        (Override(period_samples=1), "period_samples must be 2 or more, not 1."),
+        (Override(samples_per_period=1), "samples_per_period must be 2 or more, not 1."),
         (Override(transient_periods=5), "hold 5 periods, too few for 5 transient periods"),
         (Override(periods=4), "hold 5 periods, too few for 2 transient periods and 4 to keep"),
-        (Override(period_samples=64), "period_samples 64 contradicts the description"),
+        (Override(samples_per_period=64), "samples_per_period 64 contradicts the description"),
     ],
 )
 def test_impossible_override_is_refused(tmp_path, override, sentence):
@@ -288,13 +289,12 @@ def test_reference_that_never_repeats_or_has_no_lines_is_refused():
         discover("bag", noise, noise, 2000)
 
 
-def test_foreign_bags_with_other_lines_are_refused(tmp_path):
-    r, u, y = simulate()
-    excited = loop.lines(N, seed=1).excited
-    (other,) = loop.multisines(excited, 1, N, np.random.default_rng(0))
-    write_foreign(tmp_path / "one", (r, u, y))
-    write_foreign(tmp_path / "two", (np.tile(other, 5), u, y))
-    assert "one and two differ in sample rate, period or excited lines" in refusal(tmp_path)
+def test_why_foreign_bags_with_other_lines_are_no_experiment_is_said(tmp_path):
+    write_foreign(tmp_path / "one", simulate())
+    write_foreign(tmp_path / "two", simulate(samples=2 * N, seed=1))
+    why = "(one and two differ in sample rate, period or excited lines)"
+    assert why in refusal(tmp_path)
+    assert f"leave the method out. {NOT_PERIODIC} {why}." in refusal(tmp_path, method="robust")
 
 
 # What does not belong together or cannot be used

@@ -138,7 +138,7 @@ def test_a_reference_of_another_run_does_not_pass(tmp_path):
 
 def test_records_and_the_methods_of_multisines_do_not_meet(tmp_path):
     write(tmp_path / "rig" / "one", data())
-    with pytest.raises(InputError, match="robust and fast method are for multisines"):
+    with pytest.raises(InputError, match="the robust method is for multisines"):
         analyze(tmp_path / "rig", method="robust")
 
 

@@ -72,7 +72,7 @@ def test_every_line_of_the_documents_runs_on_the_example(run, files: Path, monke
         line = line.replace("--out my_rig", f"--out rig{number}")
         done = called(run, line)
         assert done.exit_code == 0, (document, line, done.output)
-        for surprise in ("Not analysed as periodic", "without a reference", "does not repeat"):
+        for surprise in ("Taken as records", "without a reference", "does not repeat"):
             assert surprise not in done.output, (document, line, done.output)
 
 
