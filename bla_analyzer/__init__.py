@@ -1,9 +1,11 @@
 """From an experiment to the Best Linear Approximation, with its noise and its distortion.
 
-A folder of bags goes in, a `results.result.Result` and its report come out. Begin with `analysis`;
-the estimators are in `bla` (robust and fast method, local polynomial; paper eq. 11), levels of
-distortion in `distortion`, the distance from models (paper eq. 14) and the best amplitude in
-`compare`. `output` writes results (`results`) and report (`report`). No ROS is needed.
+A folder of bags goes in, a `results.result.Result` and its report come out. Begin with `analysis`,
+which leads to `periodic_analysis` of multisines or `record_analysis` of all else; `checks` says
+whether the runs are fit for it. The estimators are in `bla` (robust and fast method, local
+polynomial; paper eq. 11), levels of distortion in `distortion`, the distance from models (paper
+eq. 14) and the best amplitude in `compare`, a parametric model in `fit`. `output` writes results
+(`results`) and report (`report`). No ROS is needed.
 
     >>> from bla_analyzer import analyze, load_result, write_result
     >>> bla = analyze("rig").levels[1].bla

@@ -1,11 +1,12 @@
 """Controller: the control law behind its safety functions, and the node that runs it.
 
-Reference and measured position go in, motor torque comes out. Begin with `pd_filtered` (the
-default law, paper eq. 12); `transfer_function` is any other linear law, `structures` are those that
-have names (PID, cascades), `controller_file` the form in which a user states one, `law` makes the
-law of a description, `gains` names what is unknown of it. `safety` holds limits and trips,
-`supervised_law` puts the law behind them, `lockstep` answers each position with its reference,
-`real_time` on the wall clock, `node` speaks ROS.
+Reference and measured position go in, motor torque comes out. Begin with `pd_filtered` (the default
+law, paper eq. 12); `transfer_function` is any other linear law, `structures` are those that have
+names (PID, cascades), `controller_file` the form in which a user states one, `law` makes the law of
+a description, `gains` names what is unknown of it, `polynomials` multiplies and adds ratios in
+z^-1. `safety` holds limits and trips (parameters in `limits`), `supervised_law` puts the law behind
+them, `lockstep` answers each position with its reference, `real_time` does so on the wall clock,
+where `pace` checks the stamps. `node` speaks ROS and listens to each `source` of a signal.
 
     >>> from controller_node import CONTROLLER, describe
     >>> describe(CONTROLLER.check({"p": 150.0}))  # as an experiment description holds it

@@ -127,5 +127,6 @@ def check_hardware(values: Mapping[str, Any]) -> None:
         raise InputError(f"hardware needs finite limits; give {', '.join(endless)}.")
     if values["confirm"] != values["joint"]:
         raise InputError(
-            f"hardware moves joint {values['joint']!r}; give its name as confirm to confirm that."
+            f"hardware moves joint {values['joint']!r}; confirm that with "
+            f"confirm:={values['joint']}."
         )

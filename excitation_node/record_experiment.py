@@ -117,7 +117,8 @@ def record_reference(description: RecordDescription) -> np.ndarray:
         return make(description.samples, description.sample_rate_hz, **made)
     except TypeError:
         raise InputError(
-            f"experiment description: excitation is none of a {kind}; describe it anew."
+            f"experiment description: excitation does not hold the parameters of a {kind}; make "
+            "the description again."
         ) from None
 
 

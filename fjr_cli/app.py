@@ -1,10 +1,12 @@
 """The `fjr` command: a module for each command, named like it, all by one pattern.
 
-A module holds the options of its command and a thin body, which imports what it needs when it is
-called, so that `fjr --help` is quick, and prints what came of it. Errors become one sentence by
-`cli_errors`. Options that several commands have stand in `campaign_options`, `described_runs`,
-`record_options`, `result_options`, `search_options` and `worker_options`; where commands have a
-whole group of them, as a dataclass that `option_groups` unfolds.
+Two modules have other names: `import_records` is `fjr import`, and `by_hand` holds the eight
+commands of running nodes. A module holds the options of its command and a thin body, which imports
+what it needs when it is called, so that `fjr --help` is quick, and prints what came of it. Errors
+become one sentence by `cli_errors`. Options that several commands have stand in `campaign_options`,
+`described_runs`, `graph_options`, `record_options`, `result_options`, `search_options` and
+`worker_options`; where commands have a whole group of them, as a dataclass that `option_groups`
+unfolds. Modules that end in `_summary` print results.
 """
 
 from __future__ import annotations

@@ -66,7 +66,7 @@ def run(
     ] = False,
     dry_run: DryRun = False,
 ) -> None:
-    """Make sealed cases, diagnose them, commit to the verdicts, unseal and score."""
+    """Make cases with sealed answers, diagnose them, commit to the verdicts, unseal, score."""
     from fjr_kit.installed import require_report_extra
 
     require_report_extra()
@@ -124,7 +124,9 @@ def score(
     ],
     unfinished: Annotated[
         bool,
-        typer.Option(help="End a check here whose cases have not all got their verdicts."),
+        typer.Option(
+            help="End a check although some of its cases have no verdict, and score the rest."
+        ),
     ] = False,
     out: Annotated[
         Path | None,

@@ -67,7 +67,7 @@ def step(
 def speed(
     times: Annotated[
         str | None,
-        typer.Argument(metavar="[X]", help="Times real time, or max: as fast as possible."),
+        typer.Argument(metavar="[X]", help="Multiple of real time, or max: as fast as possible."),
     ] = None,
     namespace: Namespace = RIG,
 ) -> None:

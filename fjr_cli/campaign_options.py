@@ -45,7 +45,10 @@ Set = Annotated[
 ]
 DryRun = Annotated[
     bool,
-    typer.Option("--dry-run", help="Only check everything, and say what it takes: time and disk."),
+    typer.Option(
+        "--dry-run",
+        help="Check everything and print the time and disk space that it takes; do no more.",
+    ),
 ]
 
 

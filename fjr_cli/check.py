@@ -22,7 +22,7 @@ def check(
         typer.Option(
             "--topic",
             metavar="TOPIC",
-            help="Only this topic, which must have messages; its last words are enough: "
+            help="Only this topic, which must have messages; the end of its name is enough: "
             "joint_states. Repeatable.",
         ),
     ] = None,

@@ -32,7 +32,7 @@ def compare(
         typer.Option(
             min=1e-6,
             max=0.5,
-            help="How often a comparison of what is the same may say that something changed.",
+            help="Probability that a comparison reports a change where there is none.",
         ),
     ] = 0.05,
     fail_on_change: Annotated[
@@ -46,7 +46,8 @@ def compare(
 ) -> None:
     """Tell what changed between campaigns or diagnoses, beyond chance.
 
-    Exit status: 0, with --fail-on-change 3 if anything changed, 2 bad input, 1 an error of fjr.
+    Exit status: 0; 3 if something changed and --fail-on-change is given; 2 bad input; 1 an error
+    of fjr.
     """
     from contextlib import nullcontext
 

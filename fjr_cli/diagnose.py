@@ -37,13 +37,16 @@ def diagnose(
     budget: Annotated[
         float | None,
         typer.Option(
-            min=1.0, metavar="SECONDS", help="Try nothing new after so long; what is found counts."
+            min=1.0,
+            metavar="SECONDS",
+            help="About how long the diagnosis may take; what is found by then is judged.",
         ),
     ] = None,
     as_record: Annotated[
         bool,
         typer.Option(
-            "--as-record", help="Take a periodic experiment as records, from start to end."
+            "--as-record",
+            help="Treat a periodic experiment as records: from its first sample to its last.",
         ),
     ] = False,
     signal_map: MapSignals = None,

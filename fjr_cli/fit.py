@@ -89,7 +89,7 @@ def fit(
         str, typer.Option(metavar="free|SECONDS", help="Delay of the loop: fitted, or fixed.")
     ] = "0",
     level: Annotated[
-        int | None, typer.Option(min=0, help="The only level to fit; default: all.")
+        int | None, typer.Option(min=0, help="Number of the level to fit, from 0; default: all.")
     ] = None,
     link: Annotated[
         bool,
@@ -100,7 +100,9 @@ def fit(
     ] = True,
     method: Annotated[
         MethodChoice | None,
-        typer.Option(help="How bags are analyzed, as by fjr analyze.", show_default=False),
+        typer.Option(
+            help="Method by which bags are analyzed, as in fjr analyze.", show_default=False
+        ),
     ] = None,
     signal_map: MapSignals = None,
     periods: PeriodOptions,

@@ -84,7 +84,9 @@ def import_records(
             help="Excited lines as multiples of 1/period; found in the reference if not given.",
         ),
     ] = None,
-    levels: Annotated[int, typer.Option(min=1, help="Amplitudes that the files hold.")] = 1,
+    levels: Annotated[
+        int, typer.Option(min=1, help="Number of amplitudes that the files hold, level by level.")
+    ] = 1,
 ) -> None:
     """Turn records of a rig without ROS into bags that every command reads."""
     from fjr_kit.errors import InputError

@@ -37,17 +37,24 @@ def plan(
         float | None,
         typer.Option(
             min=1e-3,
-            help="Propose the quickest experiment by which 95 % of the lines keep this error of "
-            "|G| in dB at 95 %; needs pilot bags.",
+            help="Propose the quickest experiment whose 95 % bound of the error of |G| is at most "
+            "this (dB) on 95 % of the lines of the band; needs pilot bags.",
             rich_help_panel=ACCURACY,
         ),
     ] = None,
     band: Annotated[
         tuple[float, float],
-        typer.Option(metavar="LOW HIGH", help="Band in Hz.", rich_help_panel=ACCURACY),
+        typer.Option(
+            metavar="LOW HIGH",
+            help="Frequency band of --target-db in Hz.",
+            rich_help_panel=ACCURACY,
+        ),
     ] = (1.0, 50.0),
     rig_time: Annotated[
-        float, typer.Option(min=1.0, help="Time of the rig in s.", rich_help_panel=ACCURACY)
+        float,
+        typer.Option(
+            min=1.0, help="Time that the rig can be used, in s.", rich_help_panel=ACCURACY
+        ),
     ] = 3600.0,
     resolution: Annotated[
         float | None,
@@ -77,12 +84,13 @@ def plan(
     options: CampaignOptions,
     described: RunOptions,
 ) -> None:
-    """Say what an experiment could show before rig time is spent, or what it takes.
+    """Predict, before a campaign is recorded, what a diagnosis could show or what a BLA needs.
 
-    FOLDER --target-db X proposes M, P, amplitude and grid by the noise and distortion of pilot
-    bags. FOLDER --nominal FILE says how well a diagnosis of such bags would know the datasheet's
-    parameters, and how large each effect must be to be named. Without FOLDER it says so of a
-    campaign, or of records, that nobody has recorded yet.
+    FOLDER --target-db X proposes how many realizations (M) and periods (P) a BLA needs, and which
+    amplitude and grid, from the noise and distortion of pilot bags. FOLDER --nominal FILE predicts
+    how well a diagnosis of such bags would know the datasheet's parameters, and how large each
+    effect must be to be named. Without FOLDER it predicts the same for a campaign, or for records,
+    that nobody has recorded yet.
     """
     from fjr_kit.errors import InputError
 

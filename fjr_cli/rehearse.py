@@ -32,25 +32,27 @@ def rehearse(
     duration: Annotated[
         float | None,
         typer.Option(
-            min=0.0, metavar="S", help="At least this long, in whole periods of the experiment."
+            min=0.0,
+            metavar="S",
+            help="Shortest duration in s; whole periods of the experiment are played.",
         ),
     ] = None,
     rate: Annotated[
-        float | None, typer.Option(metavar="HZ", help="Rate of the samples of all nodes.")
+        float | None, typer.Option(metavar="HZ", help="Sample rate of all nodes.")
     ] = None,
     limits: Annotated[
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="ROS parameter file with limits: /rig/rehearsal of what is measured, "
-            "/rig/controller of the controller's own. All of them: docs/rehearsal.md.",
+            help="ROS parameter file with limits: below /rig/rehearsal those of measured values, "
+            "below /rig/controller those of the controller. docs/rehearsal.md lists them.",
         ),
     ] = None,
     fault: Annotated[
         str,
         typer.Option(
             metavar="KIND[:NAME=VALUE,...]",
-            help="Fault to rehearse, such as loss:share=0.02; a wrong KIND lists all.",
+            help="Fault to rehearse, such as loss:share=0.02; an unknown KIND prints the list.",
         ),
     ] = "",
     seed: Annotated[int, typer.Option(min=0, help="Seed of the fault.")] = 1,
@@ -62,7 +64,7 @@ def rehearse(
         bool | None,
         typer.Option(
             "--hardware/--no-hardware",
-            help="Whether an external drive moves hardware; it must be said.",
+            help="Required with --drive external: whether that drive moves a real joint.",
         ),
     ] = None,
     confirm: Annotated[

@@ -72,7 +72,7 @@ def replay(
         str | None,
         typer.Option(
             metavar="FACTOR|max",
-            help="Times real time, or as fast as the readers take it. Default: 1.",
+            help="Multiple of real time, or max: as fast as the readers take it. Default: 1.",
             rich_help_panel=_PUBLISH,
         ),
     ] = None,

@@ -22,7 +22,7 @@ def datasheet_tolerance(panel: str | None = None) -> Any:
     return typer.Option(
         min=0.001,
         max=0.5,
-        help="How far a datasheet value may be off, relative.",
+        help="Relative error that a datasheet value may have, such as 0.1 for 10 %.",
         rich_help_panel=panel,
     )
 

@@ -19,18 +19,19 @@ if TYPE_CHECKING:
     from fjr_bringup.campaign.progress import CampaignProgress
 
 Composed = Annotated[
-    bool, typer.Option("--composed", help="All nodes in one process instead of one each: faster.")
+    bool,
+    typer.Option("--composed", help="Run all nodes in one process, which is faster than one each."),
 ]
 Live = Annotated[
-    bool, typer.Option("--live", help="Draw the BLA after each realization, as it is until then.")
+    bool, typer.Option("--live", help="Draw the BLA estimated so far after each realization.")
 ]
 UntilDb = Annotated[
     float | None,
     typer.Option(
         min=1e-6,
         metavar="DB",
-        help="Record no more of a level once the standard deviation of its BLA, the median of the "
-        "lines, is at most this; after four realizations at the least.",
+        help="Stop recording a level once the standard deviation of its BLA (the median over the "
+        "lines) is at most this, after four realizations at the earliest.",
     ),
 ]
 

@@ -22,7 +22,8 @@ def shape(
     ),
     rig: Rig = None,
     level: Annotated[
-        float | None, typer.Option(metavar="A", help="Amplitude of each line of the first pass.")
+        float | None,
+        typer.Option(metavar="A", help="Amplitude of each line in the first pass, in rad."),
     ] = None,
     torque_rms: Annotated[
         float | None, typer.Option(help="Torque rms in N m; default: that of the first pass.")
@@ -31,9 +32,12 @@ def shape(
         float, typer.Option(help="Distance of the torque spectrum from flat in dB, rms over lines.")
     ] = 0.5,
     damping: Annotated[
-        float, typer.Option(min=0.05, max=1.0, help="Exponent of the step; 1 is the paper's.")
+        float,
+        typer.Option(
+            min=0.05, max=1.0, help="Exponent of the step of an iteration; 1 is the paper's."
+        ),
     ] = 0.8,
-    iterations: Annotated[int, typer.Option(min=1, help="Most iterations.")] = 10,
+    iterations: Annotated[int, typer.Option(min=1, help="Greatest number of iterations.")] = 10,
     options: SearchOptions,
 ) -> None:
     """Shape the excitation until the torque spectrum is flat (algorithm 1 of the paper).

@@ -29,11 +29,11 @@ def simulate(
     workers: Workers = None,
     dry_run: DryRun = False,
 ) -> None:
-    """Make the same campaign, with the same bags, without ROS and as fast as the machine can.
+    """Simulate a campaign, without ROS and at full speed, into the bags that `fjr run` records.
 
     With --record the reference does not repeat; --set record.NAME=VALUE sets what a chirp or a move
-    needs. With --controller the loop is closed by any linear law, which the controller node does
-    not play.
+    needs. With --controller any linear controller closes the loop; the controller node itself plays
+    its PD law only.
     """
     from fjr_bringup.campaign.batch_run import simulate_campaign
     from fjr_kit.errors import InputError

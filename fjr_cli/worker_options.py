@@ -7,13 +7,14 @@ from typing import Annotated
 import typer
 
 Workers = Annotated[
-    int | None, typer.Option(min=1, help="Processes here; default: one on each core.")
+    int | None,
+    typer.Option(min=1, help="Worker processes on this machine; default: one for each core."),
 ]
 Dask = Annotated[
     str | None,
     typer.Option(
         metavar="ADDRESS",
-        help="Dask scheduler, such as tcp://host:8786, whose workers do it instead; they need "
-        "this package installed and see the same folder.",
+        help="Dask scheduler, such as tcp://host:8786, whose workers compute instead; they need "
+        "this package installed and must see the same folder.",
     ),
 ]

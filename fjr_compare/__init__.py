@@ -2,7 +2,8 @@
 
 Folders of either go in, a `result.Comparison` and its report come out. Begin with `comparing`.
 `campaigns` compares BLAs, distortion and noise, `diagnoses` parameters, causes and gaps;
-`statistics` holds the tests. All tests of a comparison share one rate of false alarms.
+`statistics` holds the tests. All tests of a comparison share one rate of false alarms. `output`
+writes the files: `words` are the sentences and tables, `compare_page` and `compare_plots` the page.
 
     >>> from fjr_compare import compare
     >>> found = compare(["rig", "rig"])

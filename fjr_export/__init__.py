@@ -2,7 +2,8 @@
 
 The parameters of a rig go in, such as those that a diagnosis has updated; a file of the tool comes
 out, and what became of each part (`result`). Begin with `exporting`. `treatments` says what each
-tool makes of each effect of the catalogue: natively, by an equivalent, or not at all. `mjcf`,
+tool makes of each effect of the catalogue: natively, by an equivalent, or not at all. `joint` is
+what is exported, `spring` its transmission as springs with dead bands. `mjcf`,
 `urdf`, `linear` and `simscape` write the files; `targets` runs those that run here, and `replay`
 plays recorded runs in them, in the loop in which they were recorded.
 

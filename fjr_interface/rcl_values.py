@@ -23,7 +23,7 @@ _NOT_FINITE = re.compile(r"[+-]?\.?(inf|infinity|nan)", re.ASCII | re.IGNORECASE
 
 
 def read_scalar(node: ScalarNode, where: str) -> bool | int | float | str:
-    """Return the value in the type that rcl's parser gives it."""
+    """Return the value in the type that rcl's parser gives it; raise InputError if it is empty."""
     text = node.value
     if node.style in ("'", '"', "|", ">"):
         return text

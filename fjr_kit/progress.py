@@ -20,7 +20,7 @@ _WIDE = 100
 
 
 class ProgressLine:
-    """A context manager that shows one line: a bar, how far it is, times, what is being done.
+    """A context manager that shows one line: a bar, the amount done, times, and the current task.
 
     Without a terminal there is no such line, only the sentences of `say`, `log` and `report`.
     """

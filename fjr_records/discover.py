@@ -99,6 +99,10 @@ def find_period(name: str, reference: np.ndarray) -> int:
     Peaks of the normalised autocorrelation are candidates; of those after which the end of the
     record repeats as well as after any other (within a factor of two of the rms difference), the
     shortest is the period. The beginning is not compared: it may be a soft start.
+
+    Raises:
+        NoPeriodError: the reference is constant, does not repeat, or its period is not a whole
+            number of samples.
     """
     x = reference - reference.mean()
     if not x.any():
@@ -163,7 +167,11 @@ def _shift(x: np.ndarray, lag: int) -> float:
 
 
 def find_lines(name: str, period: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return excited harmonics and their amplitudes: those above the widest gap in level."""
+    """Return excited harmonics and their amplitudes: those above the widest gap in level.
+
+    Raises:
+        NoPeriodError: no lines stand out.
+    """
     level = np.abs(line_spectrum(period))[1 : (period.size - 1) // 2 + 1]
     ranked = np.sort(np.maximum(level, 1e-9 * level.max(initial=0.0)))[::-1]
     ratio = ranked[:-1] / ranked[1:]

@@ -54,15 +54,15 @@ def to_control(fit: Fit, level: int, *, pade_order: int = 3) -> control.Transfer
         samples = delay * fit.sample_rate_hz
         if abs(samples - round(samples)) > 1e-6 or samples < -1e-6:
             raise InputError(
-                f"{fit.source}: a delay of {samples:.4g} samples is no whole number of them, which "
+                f"{fit.source}: a delay of {samples:.4g} samples is negative or not whole, which "
                 "a discrete transfer function cannot hold; fit with a fixed delay."
             )
         lower = np.append(lower, np.zeros(round(samples)))
     elif delay:
         if delay < 0:
             raise InputError(
-                f"{fit.source}: the delay of {delay:.4g} s is negative, which no transfer function "
-                "is; fit with --delay 0."
+                f"{fit.source}: the delay is negative ({delay:.4g} s), which a transfer function "
+                "cannot hold; fit with --delay 0."
             )
         ahead, behind = control.pade(delay, pade_order)
         upper, lower = [np.convolve(each, ahead) for each in upper], np.convolve(lower, behind)

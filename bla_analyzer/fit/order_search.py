@@ -77,7 +77,11 @@ def search(
     free_delay: bool,
     tell: Tell,
 ) -> list[Tried]:
-    """Return the models of all orders that were tried, the best first."""
+    """Return the models of all orders that were tried, the best first.
+
+    Raises:
+        InputError: the lines are too few for any order.
+    """
     made: list[Tried] = []
     best, in_vain = np.inf, 0
     for na, orders in _orders(domain):

@@ -60,8 +60,8 @@ class CommandReader:
             if efforts != len(layout.names):
                 raise InputError(
                     f"Topic {self._topic}: {efforts} efforts for the {len(layout.names)} joints "
-                    f"{', '.join(layout.names)}, so it is open whose they are; give each joint of "
-                    "the ros2_control tag an effort command interface."
+                    f"{', '.join(layout.names)}, so no effort can be assigned to its joint; give "
+                    "each joint of the ros2_control tag an effort command interface."
                 )
             places = [layout.value_offset("effort", joint) for joint in self._joints]
         except LayoutError as error:
@@ -158,7 +158,13 @@ class Observer:
         self._references: deque[tuple[int, float]] = deque(maxlen=2 * SIGNAL_DEPTH)
 
     def add_state(self, stamp_ns: int, position: float) -> list[Sample]:
-        """Take a joint state; return the samples that are complete now."""
+        """Take a joint state; return the samples that are complete now.
+
+        Raises:
+            InputError: the position is not finite; or, once samples are counted, the state does not
+                come one period after the last, or a state has no command, an effort that is not
+                finite, or no reference.
+        """
         if not math.isfinite(position):
             raise InputError(
                 f"Topic {self._states_topic}: {position} at {_seconds(stamp_ns)}; start the bridge "

@@ -114,7 +114,8 @@ class RehearsalRecorder(Recorder):
     def close(self) -> list[np.ndarray]:
         """End the bag, keep it if it is whole, and return all messages of r, y and u.
 
-        They are kept as ARRIVALS beside the bag.
+        They are kept as ARRIVALS beside the bag. A bag that is not whole raises nothing: `damage`
+        says why there is none.
         """
         if self.damage is None:
             try:

@@ -132,7 +132,11 @@ class ResampledReader(BagReader):
         return experiment.model_copy(update={"periods": periods})
 
     def blocks(self, samples: int) -> Iterator[Record]:
-        """Yield the resampled samples as `BagReader.blocks` does."""
+        """Yield the resampled samples as `BagReader.blocks` does.
+
+        Raises:
+            InputError: the topics do not stand side by side in the bag, or the bag is not whole.
+        """
         streams = {name: self._stream(found) for name, found in self.surveyed.items()}
         at = self._first - self._lead
         for name, piece in self._pieces():

@@ -1,6 +1,17 @@
 """Records of rigs without ROS, of any excitation, turned into bags of the interface.
 
 Files and a map of columns go in, bags come out. Begin with `importer.read_files` (what the files
-hold) and `importer.write_bags`; `columns` reads any format, `stamps` brings it onto an even grid,
-`repetition` and `coherence` say what kind of run it is, `describe` tells repeats from realizations.
+hold) and `importer.write_bags`.
+
+- The map: `import_map` reads which column is which signal, in which unit; `likely_columns` proposes
+  a map by the names of columns, `stated_units` takes units that the file states.
+- File formats: `columns` reads any of them, by `text`, `mat`, `numpy_file`, `hdf5` and `json_log`;
+  `source` is what they share. `record_file` reads one file and says what is doubtful in it.
+- Stamps: `timing` decides when samples were taken and brings them onto an even grid by `stamps`;
+  `clock_stamps` reads calendar and clock, `own_stamps` signals that were not sampled together;
+  `part` cuts the part that is asked for.
+- Signals: `wraps` adds the turns that an encoder leaves out, `integrals` makes angles of speeds,
+  `made_torque` the torque of a described controller.
+- The kind of run: `repetition` and `coherence` say whether a run is periodic and whether its
+  signals belong together; `describe` tells repeats from realizations.
 """

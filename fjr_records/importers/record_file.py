@@ -146,7 +146,8 @@ def read_samples(path: Path, options: ImportOptions) -> Samples:
     skip, keep, rate_hz = options.skip_samples, options.keep_samples, options.sample_rate_hz
     if rate_hz is not None and not 0.0 < rate_hz <= FASTEST_HZ:
         raise InputError(
-            f"{path}: {rate_hz:g} Hz is none; give a sample rate of up to {FASTEST_HZ:g} Hz."
+            f"{path}: {rate_hz:g} Hz is no possible sample rate; give one above 0 and up to "
+            f"{FASTEST_HZ:g} Hz."
         )
     if stamps:
         if options.repeat_reference:

@@ -12,7 +12,7 @@ where none of them is on, they are passed over at once, and where no family is, 
 integrated is the bare one.
 
 An effect is off while its sizes have their defaults; then the plant is the bare one, bit for bit.
-Parameter names in files and in ROS are `effect.parameter`.
+Parameter names in files and in ROS are `effect.parameter`. `document` writes the table of effects.
 """
 
 from __future__ import annotations

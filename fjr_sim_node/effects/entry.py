@@ -140,9 +140,10 @@ class Effect:
 
     @property
     def depends_on_others(self) -> bool:
-        """Whether what it changes depends much on the causes beside it: on what is left, or loads.
+        """Whether what the effect changes depends much on the other causes beside it.
 
-        Period and phase of a ripple are those of the error that is left.
+        Period and phase of a ripple are those of the error that these causes leave; a friction
+        under load grows with the loads that they bring.
         """
         return self.ripple or self.of_load
 

@@ -3,7 +3,8 @@
 Begin with `flexible_joint`: parameters, and the motion under a held torque. `torques` holds the
 laws of plant and effects, `presliding` friction before slip. `motion` is one Runge-Kutta step
 between events, `stick_slip` finds when that ends and which way each side goes, `step_size` chooses
-the step.
+the step. `spring` is the transmission with its effects, `statics` what holds the plant at a place,
+`places` where parameters stand among those of the kernels.
 """
 
 from .flexible_joint import (

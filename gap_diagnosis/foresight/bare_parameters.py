@@ -112,7 +112,11 @@ def parameters(sight: Sight, refit: BareRefit, tolerance: float) -> list[Foresee
 
 
 def _tied(covariance: np.ndarray, index: int, names: Sequence[str]) -> list[str]:
-    """Return which parameters trade with one: those of the worst combination that holds it."""
+    """Return which parameters trade with one.
+
+    These are the large entries of that eigenvector of the covariance which adds most to the
+    variance of the parameter.
+    """
     values, vectors = np.linalg.eigh(covariance)
     worst = vectors[:, int(np.argmax(values * vectors[index] ** 2))]
     shares = np.abs(worst) / np.abs(worst).max()

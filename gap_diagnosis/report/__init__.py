@@ -4,5 +4,5 @@ A finished investigation goes in; `gap_output` writes all files or none. The pag
 with values of `outcome_values`, plots of any record in `run_plots` and `waterfall`, and of steady
 periods in `gap_plots` and `gap_level_plots`; figures for papers are in `run_figures` and
 `gap_figures`, tables in `gap_tables`. `updated_parameters` is the file with which nodes and
-campaigns go on.
+campaigns go on, `randomisation` the ranges of its parameters.
 """

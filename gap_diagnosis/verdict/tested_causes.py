@@ -117,9 +117,10 @@ class Tested:
 
     @property
     def known_though_it_drifts(self) -> bool:
-        """Whether it gains, and surely where the squared error grows with it.
+        """Whether the cause gains; it must gain surely where the squared error grows with it.
 
-        Where a recorded torque drives the model, how far that drifts holds most of the squares.
+        Where a recorded torque drives the model, the drift of that model holds most of the squared
+        error, so that a true cause may enlarge it.
         """
         return self._well_known and (self._closes or self.gain.present)
 

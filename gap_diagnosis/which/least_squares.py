@@ -1,10 +1,10 @@
 """Bounded nonlinear least squares by Levenberg-Marquardt, with residuals evaluated in batches.
 
 All finite differences of a Jacobian are one batch, so that a simulator can run them in parallel, by
-one call; scipy's `least_squares` asks for each point
-by a call of its own (from 1.16 on, for those of a Jacobian in parallel). Between fresh Jacobians
-Broyden's rank-one update follows what the steps show (Nocedal, Wright 2006, ch. 11); a fit is
-called converged only by a fresh one.
+one call; scipy's `least_squares` calls the simulator once for each point (from version 1.16 on it
+makes these calls in parallel for the points of a Jacobian). Between fresh Jacobians Broyden's
+rank-one update follows what the steps show (Nocedal, Wright 2006, ch. 11); a fit is called
+converged only if it ended with a fresh Jacobian.
 """
 
 from __future__ import annotations

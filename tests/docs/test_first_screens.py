@@ -1,4 +1,7 @@
-"""The first screen of every package, its `__init__` docstring: what it names is there."""
+"""The first screen of every package, its `__init__` docstring, names every module that is there.
+
+What it names is there, too.
+"""
 
 from __future__ import annotations
 
@@ -47,6 +50,20 @@ def test_what_a_first_screen_names_is_there(package: str):
     assert words
     named = set(re.findall(r"`([a-z_][\w.]*)`", words)) - NO_MODULES
     assert [name for name in sorted(named) if not exists(name, package)] == []
+
+
+def modules(package: str) -> list[str]:
+    """Return the modules of a package, without what Python runs or what begins with `_`."""
+    return sorted(
+        file.stem for file in (ROOT / package).glob("*.py") if not file.stem.startswith("_")
+    )
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_a_first_screen_names_every_module(package: str):
+    named = re.findall(r"`([a-z_][\w.]*)`", first_screen(package))
+    words = {word for name in named for word in name.split(".")}
+    assert [name for name in modules(package) if name not in words] == []
 
 
 def test_the_readme_says_where_each_equation_of_the_paper_is():

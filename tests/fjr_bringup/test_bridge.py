@@ -51,7 +51,7 @@ def test_the_effort_of_a_joint_is_found_in_any_order(names, data, stamp):
     ("names", "fields", "said"),
     [
         (["a", "b"], {"effort": [1.0, 2.0]}, "joint 'elbow' is not among a, b"),
-        (["elbow", "b"], {"effort": [1.0]}, "1 efforts for the 2 joints elbow, b, so it is open"),
+        (["elbow", "b"], {"effort": [1.0]}, "1 efforts for the 2 joints elbow, b, so no effort"),
         (["elbow"], {"position": [1.0]}, "0 efforts for the 1 joints elbow"),
     ],
 )
