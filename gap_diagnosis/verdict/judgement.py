@@ -156,11 +156,13 @@ def _cause(
 ) -> Cause:
     parameters = {n: e for n, e in estimates.items() if n.startswith(f"{tested.effect}.")}
     moved = where_it_acts(fitter, found.best, tested.without, ledger.parts)
+    refit = found.steps[0].model
+    without = tested.without.model if tested.without.effects else refit
     return Cause(
         effect=tested.effect,
         others=alternatives.get(tested.effect, []),
         present=min(tested.present, reproduced(fitter, found.best)),
-        share=ledger.share(tested.without.model, found.best.model, found.steps[0].model),
+        share=ledger.share(without, found.best.model, refit),
         invariance_p=tested.invariance_p,
         where=ledger.places(moved),
         parameters=parameters,

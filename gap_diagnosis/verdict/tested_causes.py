@@ -218,7 +218,7 @@ def causes_with_tests(
         scatter: of parameters from run to run, see `moved_by_scatter`.
     """
     ledger = Ledger(fitter.evidence, fitter.select_parts)
-    fewer = {effect: _without(fitter, fit, effect, refit) for effect in fit.effects}
+    fewer = {effect: fitter.without(fit, effect) for effect in fit.effects}
     estimates = cell_estimates(fit, fitter, scatter, fewer)
     squares = [float(ledger.squares(each.model).sum()) for each in (fit, refit)]
     left = squares[0] / max(squares[1], 1e-300)
@@ -247,17 +247,6 @@ def causes_with_tests(
             )
         )
     return found
-
-
-def _without(fitter: CellFitter, fit: CellFit, effect: str, refit: CellFit) -> CellFit:
-    """Return a fit without an effect; where that was the only one, the refit if it does better.
-
-    A fit that begins with the parameters beside the effect may end where it leaves more.
-    """
-    without = fitter.without(fit, effect)
-    if without.effects or fitter.gains(without, refit).sum() >= 0.0:
-        return without
-    return refit
 
 
 def _left_over_noise(fitter: CellFitter, after: CellFit, before: CellFit) -> float:

@@ -63,6 +63,7 @@ def test_a_rig_with_backlash_is_named_and_its_gap_closed(backlash):
     half_gap = ranked[("backlash",)].parameters["backlash.half_gap_rad"]
     assert half_gap.value == pytest.approx(HALF_GAP_RAD, rel=0.05)
     assert diagnosis.gap_closed > 0.9
+    assert 0.9 < diagnosis.causes[0].share.low <= diagnosis.causes[0].share.high <= 1.0
     assert diagnosis.gap.explained.nrmse_position < 2 * diagnosis.gap.noise_floor.nrmse_position
     for name in PLANT.names:
         assert diagnosis.parameters[name].value == pytest.approx(case.truth.plant[name], rel=0.05)
