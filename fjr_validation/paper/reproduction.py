@@ -12,7 +12,6 @@ from typing import Literal
 
 from matplotlib import rc_context
 from pydantic import Field
-from rich.console import Console
 
 from fjr_kit.atomic import result_folder
 from fjr_kit.figure_style import save
@@ -96,12 +95,11 @@ def compute(
     *,
     scheduler: str | None = None,
     workers: int | None = None,
-    console: Console | None = None,
 ) -> tuple[dict[str, Arrays], float]:
     """Run all tasks; return their results and the best amplitude that Fig. 4 gave (rad)."""
 
     def stage(tasks: Sequence[Task], title: str) -> dict[str, Arrays]:
-        with ProgressLine(console, total=len(tasks)) as line:
+        with ProgressLine(total=len(tasks)) as line:
 
             def report(done: int, total: int, name: str) -> None:
                 line.report(done, total, f"{title}: {name}")

@@ -171,7 +171,7 @@ assert fitter.gains(found, refit).sum() > 10.0
 
 
 def test_a_new_effect_is_one_entry_and_its_law(tmp_path: Path) -> None:
-    """Node parameter, parameter file, fit, document, words have it; it is found; exports lack it."""
+    """Node parameter, file, fit, document and words have it; it is found; exports refuse it."""
     for package in PACKAGES:
         shutil.copytree(ROOT / package, tmp_path / package, ignore=shutil.ignore_patterns("__py*"))
     table = tmp_path / "fjr_sim_node/effects/friction.py"
