@@ -24,6 +24,7 @@ from gap_diagnosis.where.residual_map import residual_map
 from gap_diagnosis.which.catalogue import catalogue
 from gap_diagnosis.which.equivalents import partners
 from gap_diagnosis.which.search_space import Scales, starts
+from gap_diagnosis.which.seen_together import LACKED, LAWS, LOADS
 
 NOMINAL = PLANT.defaults()
 LEAD_WITH_INTEGRATOR = {
@@ -303,6 +304,26 @@ def test_a_cubic_stiffness_that_the_nominal_lacks_is_a_cause():
     assert fitter.misfit(found.best) < 1.5
     own = simulator_values({**found.best.model.plant, **found.best.model.effects})
     assert own["k1"] == pytest.approx(case.rig["k1"], rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("rig", "goes_with"), [("linear_axis", "of_a_turn"), ("swings_free", "of_command")]
+)
+def test_what_an_effect_goes_with_stands_in_its_entry(monkeypatch, rig, goes_with):
+    assert "backlash" in catalogue(NOMINAL, **{rig: True})
+    entry = replace(effects.EFFECTS["backlash"], **{goes_with: True})
+    monkeypatch.setitem(effects.EFFECTS, "backlash", entry)
+    assert "backlash" in catalogue(NOMINAL)
+    assert "backlash" not in catalogue(NOMINAL, **{rig: True})
+
+
+def test_loads_and_frictions_that_are_seen_together_are_those_of_the_table():
+    assert LOADS == ("torque_bias", "gravity", "external_spring")
+    assert LACKED == ("coulomb_friction", "viscous_friction")
+    assert [name.split(".")[0] for name in LAWS] == [*LACKED, "quadratic_friction"]
+    of_command = {e.identifier for e in effects.CATALOGUE if e.of_command}
+    of_drive = {e.identifier for e in effects.CATALOGUE if e.acts_on == "drive"}
+    assert of_drive - of_command == {"torque_bias", "cogging"} and of_command < of_drive
 
 
 def test_weight_on_a_linear_axis_is_a_constant_force():
