@@ -11,7 +11,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import get_args
 
-from fjr_interface.bags.reader import DEFAULT, SignalMap, find_bags
+from fjr_interface.bags.files import find_bags
+from fjr_interface.bags.signals import DEFAULT, SignalMap
 from fjr_interface.experiment import RecordDescription
 from fjr_interface.resampling.accuracy import Resampling
 from fjr_interface.resampling.resampled_reader import open_bag

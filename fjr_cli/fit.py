@@ -206,7 +206,7 @@ def _analyzed(source: Path) -> Result | None:
 
 
 def _default_out(source: Path) -> Path:
-    from fjr_interface.bags.reader import find_bags
+    from fjr_interface.bags.files import find_bags
 
     if source.suffix == ".json":
         return source.parent / "fit"
@@ -224,7 +224,7 @@ def _analyze(
     progress: ProgressLine,
 ) -> Result:
     from bla_analyzer.analysis import analyze
-    from fjr_interface.bags.reader import SignalMap
+    from fjr_interface.bags.signals import SignalMap
 
     return analyze(
         source,

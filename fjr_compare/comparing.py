@@ -9,7 +9,7 @@ import numpy as np
 
 from bla_analyzer.analysis import analyze
 from bla_analyzer.results.result import Result, load_result
-from fjr_interface.bags.reader import find_bags
+from fjr_interface.bags.files import find_bags
 from fjr_kit.errors import InputError
 from gap_diagnosis.outcome.diagnosis import Diagnosis
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from fjr_interface.bags.reader import DEFAULT, SignalMap
+from fjr_interface.bags.signals import DEFAULT, SignalMap
 from fjr_kit.atomic import result_folder
 
 from .joint import Joint, read_joint

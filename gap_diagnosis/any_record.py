@@ -8,11 +8,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from fjr_interface.bags.reader import DEFAULT, BagReader, SignalMap, find_bags
+from fjr_interface.bags.files import find_bags
+from fjr_interface.bags.reader import BagReader
+from fjr_interface.bags.signals import DEFAULT, SignalMap
 from fjr_interface.experiment import RecordDescription
 from fjr_interface.resampling.accuracy import Resampling
 from fjr_kit.errors import InputError
-from fjr_records.experiment_folder import Override
+from fjr_records.experiment_bag import Override
 from fjr_records.periodic import RecordedExperiment, read_experiment
 from fjr_records.records import RecordSet, read_records, reference_optional
 

@@ -7,15 +7,7 @@ the step.
 """
 
 from .flexible_joint import (
-    FS,
-    FSM,
-    FV,
-    FVM,
-    JM,
-    K0,
-    K1,
     PLANT,
-    J,
     advance,
     advance_with_effects,
     coefficients,
@@ -24,6 +16,7 @@ from .flexible_joint import (
     steps_per_second,
     with_added,
 )
+from .places import FS, FSM, FV, FVM, JM, K0, K1, J
 
 __all__ = [
     "FS",

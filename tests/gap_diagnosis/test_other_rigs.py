@@ -9,7 +9,7 @@ from effect_rig import relative_rms
 from gap_cases import fitter_of, found_in, simulate_case, write_bags
 
 from controller_node import pd_filtered
-from fjr_interface.bags.reader import SignalMap
+from fjr_interface.bags.signals import SignalMap
 from fjr_records.periodic import read_experiment
 from fjr_sim_node import effects, plant
 from fjr_sim_node.plant import PLANT
@@ -23,7 +23,8 @@ from gap_diagnosis.report.updated_parameters import simulator_values
 from gap_diagnosis.where.residual_map import residual_map
 from gap_diagnosis.which.catalogue import catalogue
 from gap_diagnosis.which.equivalents import partners
-from gap_diagnosis.which.search_space import Scales, starts
+from gap_diagnosis.which.scales import Scales
+from gap_diagnosis.which.search_space import starts
 from gap_diagnosis.which.seen_together import LACKED, LAWS, LOADS
 
 NOMINAL = PLANT.defaults()
