@@ -17,13 +17,14 @@ from fjr_interface.experiment import RecordDescription
 from fjr_interface.resampling.accuracy import Resampling
 from fjr_interface.resampling.resampled_reader import open_bag
 from fjr_kit.errors import InputError
+from fjr_kit.telling import CountedProgress
 from fjr_records.discover import NoPeriodError
 from fjr_records.experiment_bag import Override
 from fjr_records.experiment_folder import ExperimentFolder, open_experiment
 from fjr_records.records import read_records, reference_optional
 
 from .compare.metrics import ReferenceModel
-from .periodic_analysis import Progress, analyze_periodic
+from .periodic_analysis import analyze_periodic
 from .record_analysis import analyze_records
 from .results.result import Method, Result
 
@@ -36,7 +37,7 @@ def analyze(
     models: Sequence[ReferenceModel] = (),
     override: Override | None = None,
     resampling: Resampling | None = None,
-    progress: Progress | None = None,
+    progress: CountedProgress | None = None,
 ) -> Result:
     """Analyze all bags of an experiment folder.
 

@@ -121,9 +121,8 @@ def fit(
 
     from bla_analyzer.fit.fit_output import write_fit
     from bla_analyzer.fit.fitting import fit_bla
-    from bla_analyzer.output import provenance
     from fjr_kit.folder_lock import locked_folder
-    from fjr_kit.invocation import call_date, command_line
+    from fjr_kit.invocation import call_date, command_line, provenance
     from fjr_kit.progress import ProgressLine
 
     from .fit_summary import print_fit

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,6 +14,7 @@ from fjr_interface.bags.signals import DEFAULT, SignalMap
 from fjr_interface.experiment import RecordDescription
 from fjr_interface.resampling.accuracy import Resampling
 from fjr_kit.errors import InputError
+from fjr_kit.telling import Progress
 from fjr_records.experiment_bag import Override
 from fjr_records.periodic import RecordedExperiment, read_experiment
 from fjr_records.records import RecordSet, read_records, reference_optional
@@ -26,8 +27,6 @@ from .model.rig_model import Model
 from .outcome.diagnosis import Diagnosis
 from .steady_periods import investigate_periods
 from .which.search_space import TOLERANCE
-
-Progress = Callable[[str], None]
 
 
 def diagnose(
