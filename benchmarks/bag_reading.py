@@ -20,7 +20,8 @@ import numpy as np
 from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_typestore
 
-from fjr_interface.bags.reader import BagReader, find_bags, read_record
+from fjr_interface.bags.files import find_bags
+from fjr_interface.bags.reader import BagReader, read_record
 from fjr_interface.bags.writer import BagWriter
 from fjr_interface.experiment import Experiment
 from fjr_interface.topics import SIGNALS

@@ -23,7 +23,8 @@ import numpy as np
 from machine import describe
 
 from fjr_records.importers.import_map import parse_map
-from fjr_records.importers.importer import ImportOptions, import_files
+from fjr_records.importers.importer import import_files
+from fjr_records.importers.record_file import ImportOptions
 from gap_diagnosis import read_nominal
 from gap_diagnosis.any_record import diagnose
 

@@ -26,7 +26,8 @@ from machine import describe
 from robot_joint import wandering
 
 from fjr_records.importers.import_map import parse_map
-from fjr_records.importers.importer import ImportOptions, import_files
+from fjr_records.importers.importer import import_files
+from fjr_records.importers.record_file import ImportOptions
 from gap_diagnosis import read_nominal
 from gap_diagnosis.any_record import diagnose
 from gap_diagnosis.outcome.diagnosis import Diagnosis

@@ -13,12 +13,13 @@ from typing import get_args
 from fjr_interface.bags.signals import DEFAULT, SignalMap
 from fjr_interface.resampling.accuracy import Resampling
 from fjr_kit.errors import InputError
+from fjr_kit.telling import CountedProgress
 from fjr_records.any_folder import NOT_PERIODIC, open_folder
 from fjr_records.experiment_bag import Override
 from fjr_records.records import RecordSet
 
 from .compare.metrics import ReferenceModel
-from .periodic_analysis import Progress, analyze_periodic
+from .periodic_analysis import analyze_periodic
 from .record_analysis import analyze_records
 from .results.result import Method, Result
 
@@ -31,7 +32,7 @@ def analyze(
     models: Sequence[ReferenceModel] = (),
     override: Override | None = None,
     resampling: Resampling | None = None,
-    progress: Progress | None = None,
+    progress: CountedProgress | None = None,
 ) -> Result:
     """Analyze all bags of an experiment folder.
 

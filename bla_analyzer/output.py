@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-import platform
 from collections.abc import Callable
-from importlib.metadata import version
 from pathlib import Path
 
 from fjr_kit.atomic import result_folder
-from fjr_kit.installed import product_version
+from fjr_kit.invocation import provenance
+from fjr_kit.telling import Progress
 
 from .results.result import Result
 from .results.tables import frf_csv, frf_mat, frf_npz
 
-PACKAGES = ("numpy", "scipy", "matplotlib", "plotly")
 OWN_FILES = ("report.html", "frf.csv", "frf.npz", "frf.mat", "result.json", "figures/*.p[nd][gf]")
 """What an earlier analysis may have left in a folder, as patterns."""
-
-Progress = Callable[[str], None]
 
 
 def write_result(
@@ -81,12 +77,3 @@ def _write_data(result: Result, folder: Path, say: Progress) -> None:
         content = make(result)
         data = content.encode() if isinstance(content, str) else content
         (folder / name).write_bytes(data)
-
-
-def provenance(command: str | None, date: str | None) -> dict[str, str]:
-    """Return what made a report, by name: command line, date and versions."""
-    given = {"command": command, "date": date}
-    versions = [f"Python {platform.python_version()}", f"fjr-rig {product_version()}"]
-    versions += [f"{name} {version(name)}" for name in PACKAGES]
-    named = {name: text for name, text in given.items() if text is not None}
-    return named | {"versions": ", ".join(versions)}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import replace
 from itertools import groupby
@@ -12,6 +12,7 @@ import numpy as np
 
 from fjr_kit.check import Check
 from fjr_kit.errors import InputError
+from fjr_kit.telling import CountedProgress
 from fjr_records.experiment_bag import ExperimentBag
 from fjr_records.experiment_folder import ExperimentFolder
 from fjr_records.lines import Grid, Lines
@@ -28,16 +29,13 @@ from .compare.metrics import ReferenceModel, compare
 from .distortion.levels import line_levels
 from .results.result import BlaEstimate, LevelResult, Method, Result
 
-Progress = Callable[[int, int, str], None]
-"""Called after each bag with (bags done, bags, name of the bag)."""
-
 
 def analyze_periodic(
     experiment: ExperimentFolder,
     method: Method | None,
     models: Sequence[ReferenceModel],
     has_reference: bool,
-    progress: Progress | None,
+    progress: CountedProgress | None,
 ) -> Result:
     """Estimate the BLA of each level of an experiment of multisines.
 
@@ -87,7 +85,7 @@ def analyze_periodic(
     )
 
 
-def _read(experiment: ExperimentFolder, progress: Progress | None) -> list[Realization]:
+def _read(experiment: ExperimentFolder, progress: CountedProgress | None) -> list[Realization]:
     """Read all bags side by side; the result is in the order of the plan."""
     bags = experiment.bags
     firsts = {bag.level: bag.realization for bag in reversed(bags)}

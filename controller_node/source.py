@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from fjr_interface.bags.joint_state import JointStateReader
+from fjr_interface.ros.graph_node import NOT_KNOWN_YET
 from fjr_interface.ros.runtime import RigNode
 from fjr_interface.topics import Signal
-
-_UNKNOWN = "_NODE_NAME_UNKNOWN_"  # of a publisher whose node has not been heard of yet
 
 
 class Source:
@@ -75,7 +74,7 @@ class Source:
         self.names = sorted(
             f"{each.node_namespace.rstrip('/')}/{each.node_name}"
             for each in publishers
-            if each.node_name != _UNKNOWN
+            if each.node_name != NOT_KNOWN_YET
         )
 
     def others(self) -> str | None:

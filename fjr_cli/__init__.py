@@ -14,7 +14,7 @@ through `cli_errors`, so that no traceback reaches a user.
   dataclass of options.
 - What commands print: `analysis_summary`, `check_summary`, `compare_summary`, `diagnosis_summary`,
   `fit_summary`, `import_summary`, `plan_summary`, `replay_summary`, and `stage_progress` while they
-  work; `output_pipe` bears a reader that goes away.
+  work.
 - `campaign_folder` puts the bags of a campaign into their folder, `schemas` writes the JSON Schemas
   of all JSON files.
 """

@@ -114,7 +114,9 @@ def analyze_folder(
     from bla_analyzer.analysis import analyze
     from bla_analyzer.compare.reference_models import reference_models
     from bla_analyzer.output import write_result
-    from fjr_interface.bags.reader import BagReader, SignalMap, find_bags
+    from fjr_interface.bags.files import find_bags
+    from fjr_interface.bags.reader import BagReader
+    from fjr_interface.bags.signals import SignalMap
     from fjr_kit.folder_lock import locked_folder
     from fjr_kit.invocation import call_date, command_line
     from fjr_kit.progress import ProgressLine

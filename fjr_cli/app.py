@@ -17,6 +17,8 @@ from typing import Annotated
 
 import typer
 
+from fjr_kit.output_pipe import outlive_readers
+
 from .amplitude import amplitude
 from .analyze import analyze
 from .blind import blind
@@ -30,7 +32,6 @@ from .example import example
 from .export import export
 from .fit import fit
 from .import_records import import_records
-from .output_pipe import outlive_readers
 from .paper import paper
 from .plan import plan
 from .record import record

@@ -59,7 +59,8 @@ def diagnose(
     require_report_extra()
     from rich.console import Console
 
-    from fjr_interface.bags.reader import SignalMap, find_bags
+    from fjr_interface.bags.files import find_bags
+    from fjr_interface.bags.signals import SignalMap
     from fjr_interface.resampling.accuracy import Resampling
     from fjr_kit.folder_lock import locked_folder
     from fjr_kit.invocation import call_date, command_line

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 import shlex
 from pathlib import Path
 
 from rich.console import Console
 
+from fjr_kit.number_text import three_digits
 from fjr_kit.terminal import print_table
 from gap_diagnosis.outcome.cause_words import (
     cause_name,
@@ -119,11 +119,11 @@ def _steps(diagnosis: Diagnosis) -> Content:
     for step in diagnosis.steps:
         name = f"with {explanation([step.added])}" if step.added else step.stage
         shares = [_percent(step.nrmse_position), _percent(step.nrmse_torque)]
-        rows.append([name, *shares, _number(step.chi2_per_dof)])
+        rows.append([name, *shares, three_digits(step.chi2_per_dof)])
     floor = diagnosis.gap.noise_floor
     if floor is not None:
         shares = [_percent(floor.nrmse_position), _percent(floor.nrmse_torque)]
-        rows.append(["noise floor", *shares, _number(floor.chi2_per_dof)])
+        rows.append(["noise floor", *shares, three_digits(floor.chi2_per_dof)])
     return heads, rows
 
 
@@ -136,15 +136,11 @@ def _ranking(diagnosis: Diagnosis) -> Content:
     misfit = f"{HELD_OUT[diagnosis.reported_on]} misfit/dof"
     heads = [("explanation", ""), (misfit, ""), ("converged", "")]
     rows = [
-        [explanation(c.effects), _number(c.held_out_chi2), "yes" if c.converged else "no"]
+        [explanation(c.effects), three_digits(c.held_out_chi2), "yes" if c.converged else "no"]
         for c in diagnosis.ranking[:RANKED]
     ]
     return heads, rows
 
 
 def _percent(value: float | None) -> str:
-    return _number(None if value is None else 100.0 * value)
-
-
-def _number(value: float | None) -> str:
-    return "-" if value is None or not math.isfinite(value) else f"{value:.3g}"
+    return three_digits(None if value is None else 100.0 * value)

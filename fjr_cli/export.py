@@ -55,7 +55,7 @@ def export(
     """Export the joint to a simulator or control tool, and replay recorded runs in it."""
     from fjr_export.exporting import RESULT_FILE
     from fjr_export.exporting import export as export_joint
-    from fjr_interface.bags.reader import SignalMap
+    from fjr_interface.bags.signals import SignalMap
     from fjr_kit.folder_lock import locked_folder
 
     from .stage_progress import StageProgress

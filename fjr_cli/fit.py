@@ -123,9 +123,8 @@ def fit(
 
     from bla_analyzer.fit.fit_output import write_fit
     from bla_analyzer.fit.fitting import fit_bla
-    from bla_analyzer.output import provenance
     from fjr_kit.folder_lock import locked_folder
-    from fjr_kit.invocation import call_date, command_line
+    from fjr_kit.invocation import call_date, command_line, provenance
     from fjr_kit.progress import ProgressLine
 
     from .fit_summary import print_fit
@@ -208,7 +207,7 @@ def _analyzed(source: Path) -> Result | None:
 
 
 def _default_out(source: Path) -> Path:
-    from fjr_interface.bags.reader import find_bags
+    from fjr_interface.bags.files import find_bags
 
     if source.suffix == ".json":
         return source.parent / "fit"
@@ -226,7 +225,7 @@ def _analyze(
     progress: ProgressLine,
 ) -> Result:
     from bla_analyzer.analysis import analyze
-    from fjr_interface.bags.reader import SignalMap
+    from fjr_interface.bags.signals import SignalMap
 
     return analyze(
         source,

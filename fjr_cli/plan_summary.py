@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections import defaultdict
 
 from rich.console import Console
 
+from fjr_kit.number_text import three_digits
 from fjr_kit.terminal import print_table
 from gap_diagnosis.foresight.foreseen import ForeseenEffect, ForeseenParameter, Foresight
 
@@ -58,8 +58,8 @@ def _parameter(one: ForeseenParameter) -> list[str]:
         one.name,
         f"{one.nominal:.4g}",
         one.unit,
-        _number(one.error_percent),
-        _number(one.others_known_percent),
+        three_digits(one.error_percent),
+        three_digits(one.others_known_percent),
         known,
     ]
 
@@ -67,8 +67,8 @@ def _parameter(one: ForeseenParameter) -> list[str]:
 def _effect(one: ForeseenEffect) -> list[str]:
     return [
         one.parameter,
-        _number(one.limit),
-        _number(one.limit_worst),
+        three_digits(one.limit),
+        three_digits(one.limit_worst),
         one.unit,
         one.level,
         _some(one.not_told_from),
@@ -78,10 +78,6 @@ def _effect(one: ForeseenEffect) -> list[str]:
 def _some(names: list[str]) -> str:
     more = len(names) - _NAMED
     return ", ".join(names[:_NAMED]) + (f" and {more} more" if more > 0 else "") or "-"
-
-
-def _number(value: float | None) -> str:
-    return "-" if value is None or not math.isfinite(value) else f"{value:.3g}"
 
 
 def _say(console: Console, sentence: str) -> None:

@@ -9,8 +9,9 @@ import numpy as np
 
 from bla_analyzer.analysis import analyze
 from bla_analyzer.results.result import Result, load_result
-from fjr_interface.bags.reader import find_bags
+from fjr_interface.bags.files import find_bags
 from fjr_kit.errors import InputError
+from fjr_kit.telling import Progress
 from gap_diagnosis.outcome.diagnosis import Diagnosis
 
 from .campaigns import compared_campaigns
@@ -31,7 +32,6 @@ LEAST_DB = 1.0
 """A change of distortion or noise that is smaller is not counted, however sure it is."""
 
 _RESULT, _DIAGNOSIS = "result.json", "diagnosis.json"
-Progress = Callable[[str], None]
 
 
 def compare(

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from bla_analyzer.output import provenance
 from fjr_kit.atomic import result_folder
+from fjr_kit.invocation import provenance
 
 from .result import Comparison
 

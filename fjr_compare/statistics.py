@@ -8,26 +8,26 @@ import numpy as np
 from scipy.special import digamma
 from scipy.stats import chi2
 
+_MISSED = 0.05  # probability that a disc does not cover the truth
 _MOST_DEGREES = 1e6
 _HALVINGS = 60
 
 
-def degrees_of(radius: np.ndarray, variance: np.ndarray, level: float = 0.95) -> np.ndarray:
+def degrees_of(radius: np.ndarray, variance: np.ndarray) -> np.ndarray:
     """Return the complex degrees of freedom of variances, from the discs that rest on them.
 
-    Inverts radius^2 = variance n ((1 - level)^(-1/n) - 1), which falls with n.
+    Inverts radius^2 = variance n (0.05^(-1/n) - 1), which falls with n.
 
     Args:
-        radius: (F,), radii of the discs.
+        radius: (F,), radii of the discs, which cover the truth with a probability of 95 %.
         variance: (F,), variances.
-        level: probability that a disc covers the truth.
     """
     ratio = np.square(radius) / variance
     low, high = np.full(ratio.shape, np.log(0.3)), np.full(ratio.shape, np.log(_MOST_DEGREES))
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
         n = np.exp(middle)
-        above = n * np.expm1(-np.log1p(-level) / n) > ratio
+        above = n * np.expm1(-np.log(_MISSED) / n) > ratio
         low, high = np.where(above, middle, low), np.where(above, high, middle)
     return np.exp(0.5 * (low + high))
 

@@ -6,8 +6,9 @@ from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from fjr_interface.bags.reader import DEFAULT, SignalMap
+from fjr_interface.bags.signals import DEFAULT, SignalMap
 from fjr_kit.atomic import result_folder
+from fjr_kit.telling import Progress
 
 from .joint import Joint, read_joint
 from .linear import control_script, linear_joint
@@ -22,8 +23,6 @@ from .urdf import urdf
 RESULT_FILE = "export.json"
 OWN_FILES = (RESULT_FILE, "joint.xml", "joint.urdf", "joint.py", "joint.m", f"{COMPONENT}.ssc")
 """What an earlier export may have left in a folder."""
-
-Progress = Callable[[str], None]
 
 
 @dataclass(frozen=True)

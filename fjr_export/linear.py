@@ -15,10 +15,11 @@ import numpy as np
 from scipy.linalg import expm
 
 from fjr_kit.errors import InputError
+from fjr_sim_node import effects, plant
+from fjr_sim_node.plant.spring import spring_torque
 from fjr_sim_node.simulation.closed_loop import Trajectory
 
 from .joint import Joint
-from .spring import spring_torque
 
 _NEED_MOTION = (
     *("stribeck_friction_motor", "stribeck_friction_link", "quadratic_friction", "backlash"),
@@ -92,13 +93,18 @@ def _gains(joint: Joint, motions: Sequence[Trajectory]) -> dict[str, float]:
             link, _level(joint, "link", link, body["fs"]) * np.sign(link)
             + drag["link_nm_s2_rad2"] * np.abs(link) * link,
         )  # fmt: skip
-        gains["stiffness_nm_rad"] = _gain(twist, spring_torque(joint, twist))
+        gains["stiffness_nm_rad"] = _gain(twist, _spring(joint, twist))
     if not all(map(math.isfinite, gains.values())):
         raise InputError(
             f"{joint.source}: the joint does not move in the replayed bags, so that it cannot be "
             "made linear about them; give --replay with bags in which it moves."
         )
     return gains
+
+
+def _spring(joint: Joint, twist: np.ndarray) -> np.ndarray:
+    p, e = plant.coefficients(joint.exported), effects.coefficients(joint.exported)
+    return np.array([spring_torque(deflection, p, e) for deflection in twist.tolist()])
 
 
 def _level(joint: Joint, side: str, speed: np.ndarray, coulomb: float) -> np.ndarray:

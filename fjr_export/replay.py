@@ -10,7 +10,8 @@ from typing import Protocol
 import numpy as np
 
 from controller_node import transfer_function
-from fjr_interface.bags.reader import DEFAULT, SignalMap, find_bags
+from fjr_interface.bags.files import find_bags
+from fjr_interface.bags.signals import DEFAULT, SignalMap
 from fjr_interface.experiment import Experiment
 from fjr_kit.errors import InputError
 from fjr_records.records import Record, RecordSet, read_records, reference_optional

@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numpy as np
-
 from .joint import Joint
 
 _FAR = 1e3  # rad: beyond any deflection
@@ -49,18 +47,6 @@ def spring_parts(joint: Joint) -> list[SpringPart]:
         parts.append(SpringPart(share * k0 * (1.0 + sides), cubic, -_FAR, band))
         parts.append(SpringPart(share * k0 * (1.0 - sides), cubic, -band, _FAR))
     return parts
-
-
-def spring_torque(joint: Joint, deflection: np.ndarray) -> np.ndarray:
-    """Return the torque of the spring at deflections q - th (rad), in N m, exact."""
-    gap = joint.of("backlash")["half_gap_rad"]
-    soft, sides = joint.of("piecewise_stiffness"), joint.of("asymmetric_stiffness")["relative"]
-    size = np.maximum(np.abs(deflection) - gap, 0.0)
-    zone, ratio = soft["zone_rad"], soft["soft_ratio"]
-    reduced = np.where(size <= zone, ratio * size, size - (1.0 - ratio) * zone)
-    side = np.sign(deflection)
-    slope = joint.bare["k0"] * (1.0 + sides * side)
-    return side * (slope * reduced + joint.bare["k1"] * reduced**3)
 
 
 def spring_expression(joint: Joint, name: str) -> str:

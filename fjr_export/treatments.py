@@ -207,10 +207,16 @@ TREATMENTS: Mapping[Target, Mapping[str, Treatment]] = {
 }
 
 
+def treatment(target: Target, identifier: str) -> Treatment:
+    """Return what a target makes of an effect; one that it does not know is refused."""
+    unknown = _refused(f"it is not expressed in {TITLES[target]} so far")
+    return TREATMENTS[target].get(identifier, unknown)
+
+
 def treated(joint: Joint, target: Target) -> Iterator[tuple[str, Treatment]]:
     """Yield each effect that is on, with what the target makes of it."""
     for identifier in joint.effects_on:
-        yield identifier, TREATMENTS[target][identifier]
+        yield identifier, treatment(target, identifier)
 
 
 def refuse_inexpressible(joint: Joint, target: Target) -> None:
@@ -222,7 +228,7 @@ def refuse_inexpressible(joint: Joint, target: Target) -> None:
     refused = {name: t for name, t in treated(joint, target) if t.kind == "refused"}
     if not refused:
         return
-    reasons = "; ".join(f"{name}: {treatment.how}" for name, treatment in refused.items())
+    reasons = "; ".join(f"{name}: {t.how}" for name, t in refused.items())
     raise InputError(
         f"{joint.source}: {TITLES[target]} cannot express {reasons}. "
         f"Give --without {','.join(refused)} to export the rest."
@@ -233,13 +239,11 @@ def table() -> str:
     """Return what each target makes of each effect, as a Markdown table."""
     lines = [f"| effect | {' | '.join(TITLES.values())} |", "|---" * (len(TARGETS) + 1) + "|"]
     for effect in effects.CATALOGUE:
-        cells = [TREATMENTS[target][effect.identifier] for target in TARGETS]
+        cells = [treatment(target, effect.identifier) for target in TARGETS]
         told = " | ".join(f"{cell.kind}: {cell.how}" for cell in cells)
         lines.append(f"| `{effect.identifier}` | {told} |")
     return "\n".join(lines)
 
 
-TABLES = {"treatments": table()}
-
 if __name__ == "__main__":
-    renew(TABLES)
+    renew({"treatments": table()})

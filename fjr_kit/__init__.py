@@ -1,16 +1,16 @@
 """What every package needs and no rig knows of.
 
-`errors.InputError` is the one exception that a user is meant to read. Files and folders are written
-as a whole or not at all (`atomic`), a folder by one command at a time (`folder_lock`). Work that
-takes long shows how far it is (`progress`), stops at a signal where that leaves nothing behind
-(`stopping`), is spread over cores or a Dask cluster (`tasks`, `worker_pool`) and lies in processes
-that end with their parent (`processes`).
+`errors.InputError` is the one exception that a user is meant to read. Files and folders are
+written as a whole or not at all (`atomic`), a folder by one command at a time (`folder_lock`).
+Work that takes long tells how far it is (`telling`), which is shown (`progress`), stops at a signal
+where that leaves nothing behind (`stopping`), is spread over cores or a Dask cluster (`tasks`,
+`worker_pool`) and lies in processes that end with their parent (`processes`).
 
 Results are types with units, written as JSON and read back (`result_types`); a tested condition is
 a `check`. Reports are pages that open offline (`page`), with plots as plain dicts (`plots`) or
 figures (`figure_style`), numbers as `number_text`, and say how they were made (`invocation`).
 Tables go to a `terminal` or, where the code is what they describe, into a document
-(`document_tables`).
+(`document_tables`). A command outlives the reader of its output (`output_pipe`).
 
 `compiled` caches the numerical kernels by the state of their sources, `imports` finds the sources
 that a kept result rests on, `installed` where packages and extras are. `public_names` imports what

@@ -45,7 +45,6 @@ STYLE: Any = {
     "text.parse_math": False,
 }
 WIDTH_IN = 6.3
-SIGMA = "\N{GREEK SMALL LETTER SIGMA}"
 
 Style = dict[str, Any]
 

@@ -98,7 +98,6 @@ def computed(
     *,
     workers: int | None = None,
     scheduler: str | None = None,
-    apart: bool = False,
 ) -> Iterator[tuple[Task, Any]]:
     """Yield each task with its result as it is done; if the caller gives up, the rest is dropped.
 
@@ -106,7 +105,6 @@ def computed(
         tasks: with different names; nothing is kept on disk.
         workers: processes on this machine; None for one on each core.
         scheduler: address of a Dask scheduler; None for this machine.
-        apart: whether even a single process is another than this one.
 
     Raises:
         InputError: no scheduler answers, Dask is not installed, or a task refuses its input.
@@ -117,7 +115,7 @@ def computed(
         yield from _on_cluster(tasks, scheduler)
         return
     count = worker_count(workers, len(tasks))
-    if count == 1 and not apart:
+    if count == 1:
         yield from ((task, task.function(**task.parameters)) for task in tasks)
         return
     with worker_pool(count, finish=False) as pool:

@@ -10,7 +10,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from fjr_interface.bags.reader import DEFAULT, BagReader, SignalMap, find_bags
+from fjr_interface.bags.files import find_bags
+from fjr_interface.bags.reader import BagReader
+from fjr_interface.bags.signals import DEFAULT, SignalMap
 from fjr_interface.resampling.accuracy import Resampling
 from fjr_interface.resampling.resampled_reader import ResampledReader, open_bag, resampled
 from fjr_kit.errors import InputError

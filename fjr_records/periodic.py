@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fjr_interface.bags.reader import DEFAULT, SignalMap
+from fjr_interface.bags.signals import DEFAULT, SignalMap
 from fjr_interface.experiment import Experiment
 from fjr_interface.resampling.accuracy import Resampling
 from fjr_kit.errors import InputError

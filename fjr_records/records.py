@@ -13,7 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
-from fjr_interface.bags.reader import DEFAULT, BagReader, SignalMap, find_bags
+from fjr_interface.bags.files import find_bags
+from fjr_interface.bags.reader import BagReader
+from fjr_interface.bags.signals import DEFAULT, SignalMap
 from fjr_interface.experiment import Experiment, RecordDescription
 from fjr_interface.resampling.accuracy import Resampling
 from fjr_interface.resampling.resampled_reader import open_bag, resampled

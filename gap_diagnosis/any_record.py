@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from fjr_interface.bags.signals import DEFAULT, SignalMap
 from fjr_interface.resampling.accuracy import Resampling
+from fjr_kit.telling import Progress
 from fjr_records.any_folder import open_folder
 from fjr_records.experiment_bag import Override
 from fjr_records.periodic import RecordedExperiment, whole
@@ -23,8 +24,6 @@ from .model.rig_model import Model
 from .outcome.diagnosis import Diagnosis
 from .steady_periods import investigate_periods
 from .which.search_space import TOLERANCE
-
-Progress = Callable[[str], None]
 
 
 def diagnose(

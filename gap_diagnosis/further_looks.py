@@ -20,7 +20,6 @@ from .which.search_space import farthest
 
 WIDER, CLOSER = 5.0, 0.2
 """How many tolerances a further look takes for one."""
-_GAIN = "encoder_eccentricity"
 _HALF = 0.5  # of the misfit: what leaves less does clearly better
 _LESS = 0.7  # the same where only friction or stiffness is added that the datasheet lacks
 _ALIKE = 1.2  # times the misfit: what leaves less does about as well
@@ -39,7 +38,7 @@ def called_for(found: Investigation) -> dict[float, str]:
     driven = not evidence.slow and None in evidence.player.loop.laws
     ended = _ended(found)
     looks = {}
-    if ended or _GAIN in found.diagnosis.effects:
+    if ended or _has_gain(found.diagnosis):
         looks[WIDER] = "is further off"
     if ended and driven:
         looks[CLOSER] = "is right"
@@ -63,7 +62,7 @@ def says_more(
     """
     second, first = other.diagnosis, found.diagnosis
     left = [_left(diagnosis) for diagnosis in (second, first)]
-    if _GAIN in first.effects and _one_factor(second, nominal):
+    if _has_gain(first) and _one_factor(second, nominal):
         return False
     more_causes = first.effects and len(_beside(first)) < len(_beside(second))
     if times > 1.0 and (more_causes or _ended(other)):
@@ -102,6 +101,11 @@ def _ended(found: Investigation) -> bool:
         return False
     best = found.fitted.found.best
     return bool(at_limits(best.space, best.solution.x, best.model.plant))
+
+
+def _has_gain(diagnosis: Diagnosis) -> bool:
+    """Tell whether a cause stands for a gain that the fits have no other parameter for."""
+    return any(fx.EFFECTS[effect].scales == "about one angle" for effect in diagnosis.effects)
 
 
 def _beside(diagnosis: Diagnosis) -> list[str]:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
 
+from fjr_kit.telling import Progress
 from fjr_records.periodic import RecordedExperiment, RecordedRealization
 from fjr_records.records import Record, RecordSet
 
@@ -42,8 +43,6 @@ from .which.search_space import TOLERANCE
 from .which.stepwise import Stepwise
 from .which.torque_timing import Timing, timed
 from .which.unseen_friction import SCATTER
-
-Progress = Callable[[str], None]
 
 ASSUMED = (
     "How far friction scatters from run to run cannot be seen in these runs; the intervals allow "

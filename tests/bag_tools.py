@@ -15,7 +15,8 @@ from rosbags.rosbag2.enums import CompressionFormat, CompressionMode
 from rosbags.typesys import Stores, get_typestore
 
 from fjr_interface.bags.joint_state import FIELDS, JointStateWriter
-from fjr_interface.bags.reader import SignalMap, audit
+from fjr_interface.bags.reader import audit
+from fjr_interface.bags.signals import SignalMap
 from fjr_interface.bags.writer import BagWriter
 from fjr_interface.experiment import CUSTOM_DATA_KEY, Experiment
 from fjr_interface.topics import JOINT, JOINT_STATE, SIGNALS, STRING, Signal

@@ -89,8 +89,6 @@ def local_polynomial_bla(
     record: Samples,
     sample_rate_hz: float,
     band_hz: tuple[float, float],
-    half_window: int = HALF_WINDOW,
-    order: int = ORDER,
 ) -> BlaEstimate:
     """Estimate the BLA from one record of any broadband reference, periodic or not.
 
@@ -103,35 +101,28 @@ def local_polynomial_bla(
             phases that vary from line to line (noise, or a multisine over a part of its period).
         sample_rate_hz: rate of the samples.
         band_hz: lowest and highest frequency of the estimate.
-        half_window: n; 2 n + 1 must exceed 2 (R + 1).
-        order: R.
 
     Raises:
-        InputError: a window too small for the order, or a band that the record does not hold.
+        InputError: the record does not hold the band.
     """
-    freedom = 2 * half_window + 1 - 2 * (order + 1)
-    if freedom < 2:
-        raise InputError(
-            f"half_window {half_window} leaves no residual for order {order}; take "
-            f"{order + 2} or more."
-        )
+    freedom = 2 * HALF_WINDOW + 1 - 2 * (ORDER + 1)
     samples = record[0].size
     spectra = np.fft.rfft(np.stack(record)) * (2.0 / samples)
     spacing = sample_rate_hz / samples
     first, last = int(np.ceil(band_hz[0] / spacing)), int(np.floor(band_hz[1] / spacing))
-    if first < half_window or last + half_window >= spectra.shape[1] or last < first:
+    if first < HALF_WINDOW or last + HALF_WINDOW >= spectra.shape[1] or last < first:
         raise InputError(
-            f"The record of {samples / sample_rate_hz:g} s holds no window of {half_window} lines "
+            f"The record of {samples / sample_rate_hz:g} s holds no window of {HALF_WINDOW} lines "
             f"beside {band_hz[0]:g} to {band_hz[1]:g} Hz; narrow the band or record longer."
         )
     lines = np.arange(first, last + 1)
-    reach = np.arange(-half_window, half_window + 1)
+    reach = np.arange(-HALF_WINDOW, HALF_WINDOW + 1)
     near = lines[:, None] + reach
-    powers = (reach[:, None] / half_window) ** np.arange(order + 1)
+    powers = (reach[:, None] / HALF_WINDOW) ** np.arange(ORDER + 1)
     terms = np.concatenate(
         [
             spectra[0, near][:, :, None] * powers,
-            np.broadcast_to(powers, (*near.shape, order + 1)),
+            np.broadcast_to(powers, (*near.shape, ORDER + 1)),
         ],
         axis=2,
     )

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 from fjr_interface.parameter_file import save_parameter_file
 from fjr_kit.atomic import result_folder
+from fjr_kit.telling import Progress
 from fjr_sim_node.plant import PLANT
 
 from ..results.tables import mat_file, matlab_struct
@@ -21,8 +21,6 @@ OWN_FILES = (
     "figures/level_*_fit.p[nd][gf]",
 )
 """What an earlier fit may have left in a folder, as patterns."""
-
-Progress = Callable[[str], None]
 
 
 def write_fit(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Literal, get_args
 
@@ -10,6 +9,7 @@ import numpy as np
 from scipy.special import fdtrc
 
 from fjr_kit.errors import InputError
+from fjr_kit.telling import Progress
 
 from ..results.result import BlaEstimate, LevelResult, Result
 from ..results.summary import SIGNIFICANCE, level_name
@@ -27,7 +27,6 @@ from .uncertainty import Uncertainty
 OUTPUTS: tuple[Output, ...] = ("motor_position", "link_position")
 HIGHEST_ORDER = 20
 CURVE_POINTS = 400
-Progress = Callable[[str], None]
 
 
 def fit_bla(

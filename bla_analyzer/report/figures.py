@@ -18,7 +18,6 @@ from fjr_kit.figure_style import (
     NONLINEAR,
     ODD,
     RADIUS,
-    SIGMA,
     STYLE,
     Style,
     frequency_axis,
@@ -27,6 +26,7 @@ from fjr_kit.figure_style import (
     save,
     stacked_axes,
 )
+from fjr_kit.number_text import SIGMA
 
 from ..results.result import BlaEstimate, LevelResult, LineLevels, Result
 from ..results.summary import (

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from fjr_kit.number_text import SIGMA
 from fjr_kit.plots import (
     SECONDS,
     Options,
@@ -36,7 +37,6 @@ from ..results.summary import (
 )
 from .loop_plots import loop_plots
 
-SIGMA = "\N{GREEK SMALL LETTER SIGMA}"
 KINDS = (
     ("excited", "excited lines", "--excited", "circle"),
     ("odd", "odd detection lines", "--odd", "triangle-up"),

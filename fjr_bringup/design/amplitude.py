@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,6 +20,7 @@ from bla_analyzer.compare.optimum import (
 )
 from bla_analyzer.results.result import BlaEstimate
 from fjr_kit.errors import InputError
+from fjr_kit.telling import Progress
 
 from ..campaign.plan import Campaign
 from .bench import Bench, altered
@@ -32,8 +33,6 @@ RISE = 1.5
 EXTRA = 5
 """Most amplitudes beside the coarse ones: one just below a limit, four around the least value."""
 BOOTSTRAPS = 200
-
-Say = Callable[[str], None]
 
 
 @dataclass(frozen=True)
@@ -78,7 +77,7 @@ def search(
     lowest_rad: float = 1e-3,
     highest_rad: float = 1e-1,
     limits: Limits | None = None,
-    say: Say = lambda _: None,
+    say: Progress = lambda _: None,
 ) -> Search:
     """Measure upward until distortion rises again or a limit is near, then around the least value.
 
@@ -128,7 +127,7 @@ def _refuse_range(lowest_rad: float, highest_rad: float) -> None:
 class _Levels:
     """The levels measured so far."""
 
-    def __init__(self, campaign: Campaign, bench: Bench, limits: Limits, say: Say) -> None:
+    def __init__(self, campaign: Campaign, bench: Bench, limits: Limits, say: Progress) -> None:
         self.levels: dict[float, MeasuredLevel] = {}
         self._campaign, self._bench, self._limits, self._say = campaign, bench, limits, say
 

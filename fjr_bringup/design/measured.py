@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from bla_analyzer.checks import periodicity
-from fjr_interface.bags.reader import DEFAULT, SignalMap
 from fjr_kit.errors import InputError
 from fjr_records.experiment_folder import open_experiment
 from fjr_records.lines import Grid, Lines
@@ -104,13 +103,13 @@ def _simulated(campaign: Campaign, level: int, number: int, grid: Grid) -> Reali
     return read_realization(f"realization {number}", level, number, periods, grid)
 
 
-def read_levels(folder: Path, signal_map: SignalMap = DEFAULT) -> list[MeasuredLevel]:
+def read_levels(folder: Path) -> list[MeasuredLevel]:
     """Read all levels of an experiment folder, in the order of their index.
 
     Raises:
         InputError: bags that are not whole, do not belong together or cannot be used.
     """
-    experiment = open_experiment(folder, signal_map)
+    experiment = open_experiment(folder)
     levels: dict[int, list[Realization]] = {}
     for bag in experiment.bags:
         blocks = signal_blocks(bag.reader, experiment.grid.samples_per_period)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,12 +18,11 @@ from excitation_node.shaping import (
     within_limits,
 )
 from fjr_kit.errors import InputError
+from fjr_kit.telling import Progress
 
 from ..campaign.plan import Campaign
 from .bench import Bench, altered
 from .measured import MeasuredLevel, require_periodic
-
-Say = Callable[[str], None]
 
 
 @dataclass(frozen=True)
@@ -67,7 +65,7 @@ def shape(
     *,
     desired: np.ndarray | float = 1.0,
     iterations: int = 10,
-    say: Say = lambda _: None,
+    say: Progress = lambda _: None,
     **limits: Any,
 ) -> list[Iteration]:
     """Shape the torque spectrum of the campaign's first level.
@@ -118,7 +116,7 @@ def _require_room(campaign: Campaign) -> None:
 
 
 def _play(
-    campaign: Campaign, bench: Bench, number: int, desired: np.ndarray | float, say: Say
+    campaign: Campaign, bench: Bench, number: int, desired: np.ndarray | float, say: Progress
 ) -> Iteration:
     level = bench(campaign, f"pass_{number}")
     require_periodic(level, f"pass {number}")

@@ -24,11 +24,11 @@ from fjr_kit.stopping import Interruption
 
 from ..campaign.plan import Campaign
 from ..campaign.progress import CampaignProgress
+from .answers import ANSWER_S, answer_of, refuse_trip
 from .recorder import Recorder
 
 _POLL_S = 0.01
 _START_S = 90.0  # the very first start compiles the physics
-_ANSWER_S = 1.0
 _TRY_S = 10.0
 _SILENCE_S = 4.0  # a node of a stalled realization that answers nothing for so long hangs
 _STALL_S = 8.0  # Fast DDS by default repeats a message after 3 s
@@ -99,7 +99,7 @@ class Conductor:
         patience = time.monotonic() + _TRY_S
         while not (future and future.done()) and time.monotonic() < patience:
             # A node that has not matched the client yet drops its answer: ask again.
-            if client.service_is_ready() and time.monotonic() > asked + _ANSWER_S:
+            if client.service_is_ready() and time.monotonic() > asked + ANSWER_S:
                 asked = time.monotonic()
                 future = client.call_async(GetParameters.Request(names=["joint"]))
             self._wait_a_moment(until, node)
@@ -157,7 +157,7 @@ class Conductor:
         self._recorder.begin(bag, experiment)
         self._start_realization()
         self._record_all(experiment, progress)
-        self._refuse_trip()
+        refuse_trip(self._node, self._executor)
         self._recorder.finish()
         progress.finish_run(f"{bag.name} recorded", experiment.samples / experiment.sample_rate_hz)
         return bag
@@ -203,7 +203,7 @@ class Conductor:
 
     def _stands_still(self, progress: CampaignProgress) -> bool:
         """Return whether somebody has paused or stopped the simulation; say so once."""
-        answer = self._ask("simulator/status")
+        answer = answer_of("simulator/status", self._node, self._executor)
         if answer is None or answer.message.startswith("playing"):
             self._said_still = False
             return False
@@ -211,24 +211,6 @@ class Conductor:
             progress.say(f"The simulation is {answer.message}. `fjr play` lets it go on.")
             self._said_still = True
         return True
-
-    def _refuse_trip(self) -> None:
-        """Refuse a realization in which the controller held the torque at zero."""
-        answer = self._ask("controller/status")
-        if answer is not None and not answer.success:
-            raise InputError(f"The realization is not kept: the controller {answer.message}.")
-
-    def _ask(self, service: str) -> Any | None:
-        """Return the answer of a service; None if nobody offers it or no answer comes."""
-        client = self._node.create_client(Trigger, service)
-        until = time.monotonic() + _ANSWER_S
-        future = None
-        while time.monotonic() < until and not (future and future.done()):
-            self._executor.spin_once(timeout_sec=_POLL_S)
-            if future is None and client.service_is_ready():
-                future = client.call_async(Trigger.Request())
-        self._node.destroy_client(client)
-        return future.result() if future and future.done() else None
 
     def _blame_who_hangs(self) -> NoReturn:
         """Blame the node that answers nothing; the one that owes a message if all of them answer.

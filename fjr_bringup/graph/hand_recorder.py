@@ -10,22 +10,20 @@ import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
-from std_srvs.srv import Trigger
 
 from fjr_interface.bags.folder_names import bag_folder
 from fjr_interface.bags.writer import BagWriter, keep_whole_periods
 from fjr_interface.experiment import Experiment
 from fjr_interface.topics import NAMESPACE, SIGNALS, Signal, checked_namespace, stamp_ns
-from fjr_kit.errors import InputError
 from fjr_kit.stopping import Interruption
 
 from ..campaign.progress import CampaignProgress
+from .answers import refuse_trip
 from .domain import own_domain, reach
 from .recorder import STAMP, STAMP_FORMAT, Recorder
 
 _POLL_S = 0.01
 _SAY_S = 3.0
-_ANSWER_S = 1.0
 
 
 class HandRecorder(Recorder):
@@ -165,7 +163,7 @@ def record_by_hand(
             try:
                 for _ in range(count):
                     _record_one(recorder, out, progress, interruption)
-                    _refuse_trip(recorder, namespace)
+                    _refuse_trip(namespace)
                     bag = bag_folder(
                         out, recorder.experiment.level, recorder.experiment.realization
                     )
@@ -223,23 +221,16 @@ def _waits_for(recorder: HandRecorder) -> str:
     )
 
 
-def _refuse_trip(recorder: HandRecorder, namespace: str) -> None:
-    """Refuse a realization in which the controller held the torque at zero."""
+def _refuse_trip(namespace: str) -> None:
+    """Refuse a trip by a node of its own, since that of the recorder hears samples alone."""
     node: Node = rclpy.create_node("record_client", namespace=namespace)
     executor = SingleThreadedExecutor()
     executor.add_node(node)
-    client = node.create_client(Trigger, "controller/status")
-    until, future = time.monotonic() + _ANSWER_S, None
-    while time.monotonic() < until and not (future and future.done()):
-        executor.spin_once(timeout_sec=_POLL_S)
-        if future is None and client.service_is_ready():
-            future = client.call_async(Trigger.Request())
-    executor.shutdown()
-    node.destroy_node()
-    answer = future.result() if future and future.done() else None
-    if answer is not None and not answer.success:
-        recorder.abort()
-        raise InputError(f"The realization is not kept: the controller {answer.message}.")
+    try:
+        refuse_trip(node, executor)
+    finally:
+        executor.shutdown()
+        node.destroy_node()
 
 
 def _bytes(stamp: int) -> bytes:

@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from bla_analyzer.output import provenance
 from fjr_interface.bags.folder_names import bag_folder
 from fjr_interface.experiment import Experiment
 from fjr_interface.ros import fast_dds
@@ -20,6 +19,7 @@ from fjr_interface.topics import NAMESPACE, NODES
 from fjr_kit.atomic import write_whole
 from fjr_kit.check import Check
 from fjr_kit.folder_lock import locked_folder
+from fjr_kit.invocation import provenance
 from fjr_kit.processes import ProcessGroup
 from fjr_kit.stopping import Interruption
 from fjr_sim_node.drive.faults import NODE, FaultPlan

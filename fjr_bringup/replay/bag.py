@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from fjr_interface.bags.reader import BagReader, Record, find_bags, read_record
+from fjr_interface.bags.files import find_bags
+from fjr_interface.bags.reader import BagReader, Record, read_record
 from fjr_interface.experiment import Experiment, periodic
 from fjr_interface.parameters import Parameter
 from fjr_kit.errors import InputError

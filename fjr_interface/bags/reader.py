@@ -19,20 +19,9 @@ from ..experiment import CUSTOM_DATA_KEY, Experiment, RecordDescription, parse_e
 from ..topics import EXPERIMENT_TOPIC, STRING
 from .audit import Grid, SignalAudit, refuse_different_stamps, regular_rate_hz
 from .blocks import MEND, Block
-from .files import bag_files, find_bags
+from .files import bag_files
 from .signal_queues import SignalQueue, ready_and_lag
 from .signals import DEFAULT, SignalMap, SignalSource, decode
-
-__all__ = [
-    "DEFAULT",
-    "BagReader",
-    "Record",
-    "SignalMap",
-    "SignalSource",
-    "audit",
-    "find_bags",
-    "read_record",
-]
 
 LINEAR_AXIS = (
     "The axis is linear: read m for rad, N for N m and kg for kg m2 wherever units are said."

@@ -20,7 +20,8 @@ from .claims import claim
 Values = dict[str, Any]
 """Checked parameter values by name."""
 
-_NOT_KNOWN_YET = "_NODE_NAME_UNKNOWN_"  # of a node whose name has not been discovered yet
+NOT_KNOWN_YET = "_NODE_NAME_UNKNOWN_"
+"""Name of a node that has been discovered, its name not yet."""
 
 
 class GraphNode(Node):
@@ -79,7 +80,7 @@ class GraphNode(Node):
         own = self.get_name(), self.get_namespace()
         for writer in self.get_publishers_info_by_topic(topic):
             name, namespace = writer.node_name, writer.node_namespace
-            if (name, namespace) != own and name != _NOT_KNOWN_YET:
+            if (name, namespace) != own and name != NOT_KNOWN_YET:
                 who = f"{namespace.rstrip('/')}/{name}"
                 raise _taken(f"The node {who}", topic, self.context.get_domain_id())
 

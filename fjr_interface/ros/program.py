@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 from fjr_kit.errors import InputError, needing_ros
+from fjr_kit.output_pipe import outlive_readers
 
 from ..parameter_file import refuse_empty
 from ..parameters import Parameter, ParameterGroup
@@ -24,8 +25,9 @@ def run_module(module: str) -> int:
     """Run `main` of a module that needs ROS; return the exit status.
 
     Ctrl-C ends it quietly while it is still being loaded, too; where ROS is not there, one sentence
-    says so.
+    says so. Nor does it end earlier, or with a traceback, if nobody reads its output to the end.
     """
+    outlive_readers()
     try:
         with needing_ros():
             main = importlib.import_module(module).main

@@ -54,6 +54,7 @@ CLOCK_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 JOINT_PARAMETER = Parameter("joint", JOINT, "", "Joint name in name[0] of the messages")
 
 _LOOK_S = 1.0  # between two looks at how the node is
+_AWAIT_S = 0.01  # between two looks for what is awaited
 
 
 def readers_parameter(*nodes: str) -> Parameter:
@@ -190,15 +191,12 @@ class RigNode(GraphNode):
                 self.values[change.name] = self.group[change.name].check(plain(change.value))
         self.values_changed()
 
-    def wait_until(
-        self, missing: Callable[[], Lack | None], then: Callable[[], None], period_s: float = 0.01
-    ) -> None:
+    def wait_until(self, missing: Callable[[], Lack | None], then: Callable[[], None]) -> None:
         """Call `then` once nothing is missing; meanwhile say every few seconds what is.
 
         Args:
             missing: returns what is still waited for, None if nothing.
             then: what to do when all is there.
-            period_s: time between two looks.
         """
         self.stop_waiting()
         self._missing = missing
@@ -209,7 +207,7 @@ class RigNode(GraphNode):
                 self.begun = True
                 then()
 
-        self._wait = self.call_every(period_s, look)
+        self._wait = self.call_every(_AWAIT_S, look)
         look()
 
     def stop_waiting(self) -> None:

@@ -35,6 +35,9 @@ READERS: dict[str, Callable[[Path], Names]] = {
     ".hdf5": hdf5.open_hdf5,
 }
 """What reads a file, by its suffix; each may be followed by .gz where it holds text."""
+_MOST = 200
+"""How many names of a file are looked at to say what it holds."""
+
 _BY_PANDAS = "as by pandas.{}(FILE).to_csv(NEW)"
 ELSEWHERE: dict[str, str] = {
     ".parquet": f"write it as CSV or NPZ, {_BY_PANDAS.format('read_parquet')}",
@@ -116,18 +119,17 @@ class Held:
     holes: int = 0
 
 
-def held_columns(path: str | Path, most: int = 200) -> tuple[list[Held], int]:
-    """Return what a file holds, in its order, and how much more there is beyond the most.
+def held_columns(path: str | Path) -> tuple[list[Held], int]:
+    """Return what a file holds, in its order, and how many names beyond _MOST are not looked at.
 
     Raises InputError if the file cannot be read.
 
     Args:
         path: the file, as for `read_columns`.
-        most: how many names are looked at.
     """
 
     def held(found: Names) -> tuple[list[Held], int]:
-        return [_held(name, found) for name in found.known[:most]], len(found.known[most:])
+        return [_held(name, found) for name in found.known[:_MOST]], len(found.known[_MOST:])
 
     return _of_file(Path(path), held)
 

@@ -1,11 +1,12 @@
 """The table of effects that the bare plant lacks: one entry for each, and nothing said elsewhere.
 
 An entry (`entry.Effect`) holds identifier, law, parameters with unit, bounds and source, what the
-effect acts on, starts of fits, near and exact equivalents, and telltale. Node parameters, parameter
-files, fits, documents and reports all read it. To add an effect, add its entry to `friction`,
-`transmission` or `drive` and write its law (in `plant` or `simulation.rig`), where
-`fx.EFFECT_PARAMETER`, in capitals, is the place of a parameter among the coefficients. What is the
-bare plant with other values (friction that a datasheet lacks) needs no kernel: `plant.with_added`.
+effect acts on and depends on, starts of fits, near and exact equivalents, and telltale. Node
+parameters, parameter files, fits, documents and reports all read it. To add an effect, add its
+entry to `friction`, `transmission` or `drive` and write its law (in `plant` or `simulation.rig`),
+where `fx.EFFECT_PARAMETER`, in capitals, is the place of a parameter among the coefficients. What
+is the bare plant with other values (friction that a datasheet lacks) needs no kernel:
+`plant.with_added`.
 
 After the parameters stand three switches, one for the laws of each of these families in `plant`:
 where none of them is on, they are passed over at once, and where no family is, the plant that is
@@ -26,7 +27,7 @@ from fjr_interface.parameters import nearest
 from fjr_kit.errors import InputError, shown
 
 from .drive import DRIVE, ENCODER
-from .entry import Effect, EffectParameter
+from .entry import AtVelocity, Effect, EffectParameter, Load
 from .friction import FRICTION
 from .transmission import TRANSMISSION
 
@@ -36,8 +37,10 @@ __all__ = [
     "EFFECTS",
     "NAMES",
     "PARAMETERS",
+    "AtVelocity",
     "Effect",
     "EffectParameter",
+    "Load",
     "check_identifiers",
     "coefficients",
     "contains",

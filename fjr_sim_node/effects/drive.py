@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 
-from .entry import QUARTERS, Effect, EffectParameter, angle, ripple, ripple_starts, size
+import numpy as np
+
+from .entry import QUARTERS, Effect, EffectParameter, Load, angle, ripple, ripple_starts, size
 
 _SHARES = (0.15, 0.25, 0.4, 0.5, 0.6, 0.7, 0.75, 0.8, 0.85, 0.9, 0.94, 0.97, 1.0, 1.04, 1.1)
 """Torque limits over the greatest commanded torque: which peaks are clipped changes from one to
@@ -26,6 +28,7 @@ DRIVE: tuple[Effect, ...] = (
         (size("torque_nm", "N m", "Constant torque", -1e4),),
         ({"torque_nm": (0.002,)},),
         looks_like="constant torque",
+        load=Load(lambda q: [np.ones(q.size)], lambda sizes: {"torque_nm": sizes[0]}),
     ),
     Effect(
         "cogging",
@@ -50,6 +53,7 @@ DRIVE: tuple[Effect, ...] = (
         (size("time_s", "s", "Transport delay", 0.0, 0.1),),
         ({"time_s": _PERIODS},),
         looks_like="late torque",
+        of_command=True,
     ),
     Effect(
         "actuator_lag",
@@ -61,6 +65,7 @@ DRIVE: tuple[Effect, ...] = (
         (size("time_constant_s", "s", "Time constant", 0.0, 0.1, negligible=0.005),),
         ({"time_constant_s": _PERIODS},),
         looks_like="late torque",
+        of_command=True,
     ),
     Effect(
         "torque_saturation",
@@ -75,6 +80,7 @@ DRIVE: tuple[Effect, ...] = (
             EffectParameter("knee", 0.0, "", "Share of the limit over which it bends", 0.0, 1.0),
         ),
         ({"limit_nm": _SHARES, "knee": (0.1,)},),
+        of_command=True,
     ),
     Effect(
         "torque_speed_limit",
@@ -91,6 +97,7 @@ DRIVE: tuple[Effect, ...] = (
         ),
         ({"stall_nm": _LINE_SHARES, "no_load_rad_s": (3.0, 5.0, 8.0, 14.0)},),
         contains=("torque_saturation",),
+        of_command=True,
     ),
     Effect(
         "torque_slew_limit",
@@ -103,6 +110,7 @@ DRIVE: tuple[Effect, ...] = (
                          role="limit", fit=(1e-4, 4.0)),),
         ({"limit_nm_s": (0.002, 0.004, 0.008, 0.02, 0.04, 0.07, 0.1, 0.15, 0.2, 0.3, 0.4, 0.55,
                          0.7, 0.9)},),
+        of_command=True,
     ),
     Effect(
         "dead_band",
@@ -113,6 +121,7 @@ DRIVE: tuple[Effect, ...] = (
         "dead zone of an amplifier; Tao, Kokotovic 1994, IEEE TAC 39(1)",
         (size("width_nm", "N m", "Half width of the dead band"),),
         ({"width_nm": (0.003, 0.03)},),
+        of_command=True,
     ),
     Effect(
         "torque_constant_ripple",
@@ -124,6 +133,7 @@ DRIVE: tuple[Effect, ...] = (
         ripple("amplitude", "", 1.0, "the torque constant, relative"),
         ripple_starts("amplitude", 0.02),
         ripple=True,
+        of_command=True,
     ),
     Effect(
         "torque_gain",
@@ -135,7 +145,8 @@ DRIVE: tuple[Effect, ...] = (
         (size("relative_error", "", "Torque beyond the commanded one, relative", -0.9, 10.0),),
         ({"relative_error": (0.05,)},),
         same_as="all parameters of the bare plant scaled by one factor",
-        scales=True,
+        scales="everywhere",
+        of_command=True,
     ),
 )  # fmt: skip
 
@@ -162,6 +173,6 @@ ENCODER: tuple[Effect, ...] = (
             angle("phase_rad", "Phase at angle zero"),
         ),
         ({"amplitude_rad": (1e-3, 3e-2), "phase_rad": QUARTERS},),
-        scales=True,
+        scales="about one angle",
     ),
 )

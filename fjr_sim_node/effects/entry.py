@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
+
+import numpy as np
 
 from fjr_interface.parameters import Parameter
 
@@ -18,6 +20,22 @@ Start = Mapping[str, tuple[float, ...]]
 """Starting values by parameter name; all combinations are tried."""
 FromPart = Callable[[Mapping[str, float], Mapping[str, float]], dict[str, float]]
 """Takes effect parameters by full name and bare parameters; returns effect parameters."""
+AtVelocity = Callable[[np.ndarray], np.ndarray]
+"""Takes velocities (rad/s); returns torques (N m) of a size of one."""
+
+
+@dataclass(frozen=True)
+class Load:
+    """A torque on the joint that depends on nothing but the angle, linear in its sizes.
+
+    Attributes:
+        torques: takes angles (rad); returns the torque (N m) of each size of one.
+        parameters: takes the sizes; returns the parameters of the effect by their short names, or
+            None where no such load has these sizes.
+    """
+
+    torques: Callable[[np.ndarray], list[np.ndarray]]
+    parameters: Callable[[Sequence[float]], dict[str, float] | None]
 
 
 @dataclass(frozen=True)
@@ -40,6 +58,8 @@ class EffectParameter(Parameter):
             for all others.
         adds_to: bare parameter that it adds to, for datasheets that lack it: fits free it only
             where that is zero. Empty for all others.
+        at_velocity: friction of the motor at a velocity for a size of one, where it is proportional
+            to the size; None for all others.
     """
 
     role: Role = "shape"
@@ -49,6 +69,7 @@ class EffectParameter(Parameter):
     of_link: bool = False
     falls_to: str = ""
     adds_to: str = ""
+    at_velocity: AtVelocity | None = None
 
     def fit_bounds(self, scale: float) -> tuple[float, float]:
         """Return the least and the greatest value that a fit may take.
@@ -87,7 +108,13 @@ class Effect:
         same_as: what it equals exactly, in words; empty if nothing.
         ripple: whether it is periodic in the motor angle, so that `cycles_per_turn` is searched.
         of_load: whether it goes with the torque in the gear.
-        scales: whether it scales the parameters of the bare plant, wholly or about one angle.
+        of_command: whether it changes a torque that is asked for: where none is, there is nothing
+            to change.
+        of_a_turn: whether it depends on the angle of a turn, so that a linear axis has none: weight
+            is a constant force there.
+        load: the torque on the joint if that depends on the angle alone; None for all others.
+        scales: whether it scales the parameters of the bare plant: all of them everywhere, or about
+            one angle; empty if it does not.
         contains: effects that it holds as limit cases, which explain what they can with less.
         from_part: where its fit begins if one of what it holds was fitted: its parameters by full
             name, from the parameters of that fit's effects and of its bare plant; None: as without.
@@ -117,7 +144,10 @@ class Effect:
     same_as: str = ""
     ripple: bool = False
     of_load: bool = False
-    scales: bool = False
+    of_command: bool = False
+    of_a_turn: bool = False
+    load: Load | None = None
+    scales: Literal["", "everywhere", "about one angle"] = ""
     contains: tuple[str, ...] = ()
     from_part: FromPart | None = None
     rarer_than: str = ""
@@ -183,12 +213,13 @@ def size(
     fit: tuple[float, float] | None = None,
     absolute: bool = False,
     adds_to: str = "",
+    at_velocity: AtVelocity | None = None,
 ) -> EffectParameter:
     """Return a size: zero while the effect is off."""
     return EffectParameter(
         name, 0.0, unit, description, low, high,
         role="size", fit=fit, negligible=negligible, of_link=of_link, absolute=absolute,
-        adds_to=adds_to,
+        adds_to=adds_to, at_velocity=at_velocity,
     )  # fmt: skip
 
 

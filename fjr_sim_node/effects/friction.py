@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from .entry import Effect, EffectParameter, Start, ripple, ripple_starts, size
+import numpy as np
+
+from .entry import AtVelocity, Effect, EffectParameter, Start, ripple, ripple_starts, size
 
 # A level above Coulomb friction bends the bare parameters so far that small ones promise nothing;
 # a great level that falls within a small velocity would only make the plant stiff.
@@ -27,11 +29,24 @@ def _stribeck(side: str) -> tuple[EffectParameter, ...]:
     )  # fmt: skip
 
 
+def _constant(v: np.ndarray) -> np.ndarray:
+    return -np.sign(v)
+
+
+def _linear(v: np.ndarray) -> np.ndarray:
+    return -v
+
+
+def _squared(v: np.ndarray) -> np.ndarray:
+    return -v * np.abs(v)
+
+
 def _lacking(
-    quantity: str, name: str, unit: str, motor: str, link: str
+    quantity: str, name: str, unit: str, motor: str, link: str, at_velocity: AtVelocity
 ) -> tuple[EffectParameter, ...]:
     return (
-        size(f"motor_{name}", unit, f"{quantity} of the motor beyond {motor}", adds_to=motor),
+        size(f"motor_{name}", unit, f"{quantity} of the motor beyond {motor}", adds_to=motor,
+             at_velocity=at_velocity),
         size(f"link_{name}", unit, f"{quantity} of the link beyond {link}", adds_to=link,
              of_link=True),
     )  # fmt: skip
@@ -63,7 +78,7 @@ FRICTION: tuple[Effect, ...] = (
         "plant.flexible_joint:with_added",
         "low amplitude, damped at all frequencies",
         "paper eq. 2, fs sgn(q')",
-        _lacking("Coulomb friction", "nm", "N m", "fsm", "fs"),
+        _lacking("Coulomb friction", "nm", "N m", "fsm", "fs", _constant),
         _on_either_side("nm", (0.02, 0.2)),
         looks_like_held="friction of the motor",
         same_as="a larger fsm or fs",
@@ -76,7 +91,7 @@ FRICTION: tuple[Effect, ...] = (
         "plant.flexible_joint:with_added",
         "resonance damped at all amplitudes, low frequencies lower",
         "paper eq. 2, fv q'",
-        _lacking("Viscous friction", "nm_s_rad", "N m s/rad", "fvm", "fv"),
+        _lacking("Viscous friction", "nm_s_rad", "N m s/rad", "fvm", "fv", _linear),
         _on_either_side("nm_s_rad", (0.02,)),
         looks_like_held="drag of the motor",
         same_as="a larger fvm or fv",
@@ -225,7 +240,8 @@ FRICTION: tuple[Effect, ...] = (
         "grows with amplitude",
         "fluid and lubricant drag, sgn(v) v^2",
         (
-            size("motor_nm_s2_rad2", "N m s2/rad2", "Drag on the motor"),
+            size("motor_nm_s2_rad2", "N m s2/rad2", "Drag on the motor",
+                 at_velocity=_squared),
             size("link_nm_s2_rad2", "N m s2/rad2", "Drag on the link", of_link=True),
         ),
         (

@@ -2,13 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from .entry import Effect, EffectParameter, angle, ripple, ripple_starts, size
+from .entry import Effect, EffectParameter, Load, angle, ripple, ripple_starts, size
 
 _MODES = tuple(np.geomspace(0.08, 2.0, 44).tolist())
 """Frequencies of a light third mass over the highest with signal: it shows in a band as narrow as
 its damping."""
+
+
+def _weight(sizes: Sequence[float]) -> dict[str, float]:
+    along, across = sizes
+    return {
+        "torque_nm": float(np.hypot(along, across)),
+        "angle_rad": float(np.arctan2(across, along)),
+    }
+
+
+def _spring(sizes: Sequence[float]) -> dict[str, float] | None:
+    """Return the parameters of a spring; None if it pushes."""
+    stiffness, torque = sizes
+    if not stiffness > 0.0:
+        return None
+    return {"stiffness_nm_rad": stiffness, "rest_rad": torque / stiffness}
+
 
 TRANSMISSION: tuple[Effect, ...] = (
     Effect(
@@ -138,6 +157,8 @@ TRANSMISSION: tuple[Effect, ...] = (
         ({"torque_nm": (0.003, 0.03), "angle_rad": (0.0, np.pi / 2, np.pi)},),
         looks_like="constant torque",
         same_as="cogging of one cycle per turn, on a rigid axis",
+        of_a_turn=True,
+        load=Load(lambda q: [-np.sin(q), -np.cos(q)], _weight),
         axis="both",
     ),
     Effect(
@@ -157,6 +178,7 @@ TRANSMISSION: tuple[Effect, ...] = (
             {"stiffness_nm_rad": (0.01,), "rest_rad": (-3.0, 3.0)},
         ),
         looks_like="constant torque",
+        load=Load(lambda q: [-q, np.ones(q.size)], _spring),
         rarer_than="gravity",
         axis="both",
     ),

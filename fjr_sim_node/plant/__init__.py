@@ -8,15 +8,7 @@ the step. `spring` is the transmission with its effects, `statics` what holds th
 """
 
 from .flexible_joint import (
-    FS,
-    FSM,
-    FV,
-    FVM,
-    JM,
-    K0,
-    K1,
     PLANT,
-    J,
     advance,
     advance_with_effects,
     coefficients,
@@ -25,6 +17,7 @@ from .flexible_joint import (
     steps_per_second,
     with_added,
 )
+from .places import FS, FSM, FV, FVM, JM, K0, K1, J
 
 __all__ = [
     "FS",

@@ -39,8 +39,6 @@ from .stick_slip import (
     remembered,
 )
 
-__all__ = ["FS", "FSM", "FV", "FVM", "JM", "K0", "K1", "PLANT", "J", "advance", "coefficients"]
-
 PLANT = ParameterGroup(
     Parameter("jm", 0.2, "kg m2", "Motor inertia", 1e-9, 1e4, symbol="Jm", source="paper eq. 5"),
     Parameter(

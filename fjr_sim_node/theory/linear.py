@@ -64,15 +64,6 @@ def _rigid(inertia: float, viscous: float) -> tuple[np.ndarray, np.ndarray]:
     return np.kron(np.eye(2), body), np.array([0.0, 1.0 / inertia] * 2)
 
 
-def continuous_g0(
-    parameters: Mapping[str, Any], frequency_hz: np.ndarray, damping: Damping = "viscous"
-) -> np.ndarray:
-    """Return G0(j 2 pi f) in rad/(N m), complex of the shape of `frequency_hz`."""
-    a, b = state_space(parameters, damping)
-    s = 2j * np.pi * np.asarray(frequency_hz, float)
-    return _states(s, a, b)[..., 2]
-
-
 def g0(
     parameters: Mapping[str, Any],
     frequency_hz: np.ndarray,
@@ -106,13 +97,8 @@ def zoh_states(
     """
     transition, held = held_torque(*state_space(parameters, damping), 1.0 / sample_rate_hz)
     z = np.exp(2j * np.pi * np.asarray(frequency_hz, float) / sample_rate_hz)
-    return _states(z, transition, held)
-
-
-def _states(at: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return (at I - a)^-1 b for each complex number of `at`: its shape and one axis of states."""
-    resolvent = at[..., None, None] * np.eye(4) - a
-    return np.linalg.solve(resolvent, np.broadcast_to(b[:, None], (*at.shape, 4, 1)))[..., 0]
+    resolvent = z[..., None, None] * np.eye(4) - transition
+    return np.linalg.solve(resolvent, np.broadcast_to(held[:, None], (*z.shape, 4, 1)))[..., 0]
 
 
 def held_torque(a: np.ndarray, b: np.ndarray, seconds: float) -> tuple[np.ndarray, np.ndarray]:

@@ -11,6 +11,7 @@ import numpy as np
 
 _FIRST_STEP = 0.1  # of the box
 _TOLERANCE = 1e-4  # of the box, and of the cost
+_SEED = 1  # of the random numbers
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,6 @@ def cma_fit(
     cost: Callable[[Mapping[str, float]], float],
     free: Mapping[str, Free],
     seconds: float,
-    seed: int = 1,
 ) -> tuple[dict[str, float], float]:
     """Return the values of least cost and that cost.
 
@@ -44,7 +44,6 @@ def cma_fit(
         cost: of values by name; not finite where nothing can be said.
         free: what may change, by name.
         seconds: after which no further generation is begun.
-        seed: of the strategy's random numbers.
     """
     import cma
 
@@ -63,7 +62,7 @@ def cma_fit(
         _FIRST_STEP,
         {
             "bounds": [0.0, 1.0],
-            "seed": seed,
+            "seed": _SEED,
             "verbose": -9,
             "tolx": _TOLERANCE,
             "tolfun": _TOLERANCE,

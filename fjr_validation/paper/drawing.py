@@ -75,8 +75,3 @@ def curve(x: ArrayLike, y: ArrayLike, name: str, color: str, **options: Any) -> 
     """Return a page's trace of what is printed in `color`: a solid line, or points of a symbol."""
     style = {"dash": "" if "symbol" in options else "solid", "at": PLAIN} | options
     return trace(x, y, name, themed(color), **style)
-
-
-def span(low: float, high: float, digits: int = 3) -> str:
-    """Return an interval as text."""
-    return f"{low:.{digits}g} to {high:.{digits}g}"

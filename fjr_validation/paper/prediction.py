@@ -8,7 +8,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from bla_analyzer.compare.metrics import LOW_LINES_HZ, squared_error_db
-from fjr_kit.figure_style import SIGMA, log_values
+from fjr_kit.figure_style import log_values
+from fjr_kit.number_text import SIGMA
 from fjr_kit.plots import layout
 from fjr_kit.tasks import Arrays
 

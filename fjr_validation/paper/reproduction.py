@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 import os
-import platform
 import time
 from collections.abc import Sequence
-from importlib.metadata import version
 from pathlib import Path
 from typing import Literal
 
 from matplotlib import rc_context
 from pydantic import Field
-from rich.console import Console
 
 from fjr_kit.atomic import result_folder
 from fjr_kit.figure_style import save
 from fjr_kit.folder_lock import locked_folder
-from fjr_kit.installed import product_version
-from fjr_kit.invocation import call_date, command_line
+from fjr_kit.invocation import call_date, command_line, provenance
 from fjr_kit.progress import ProgressLine
 from fjr_kit.result_types import Document, FreeForm
 from fjr_kit.tasks import Arrays, Task, run_tasks
@@ -96,12 +92,11 @@ def compute(
     *,
     scheduler: str | None = None,
     workers: int | None = None,
-    console: Console | None = None,
 ) -> tuple[dict[str, Arrays], float]:
     """Run all tasks; return their results and the best amplitude that Fig. 4 gave (rad)."""
 
     def stage(tasks: Sequence[Task], title: str) -> dict[str, Arrays]:
-        with ProgressLine(console, total=len(tasks)) as line:
+        with ProgressLine(total=len(tasks)) as line:
 
             def report(done: int, total: int, name: str) -> None:
                 line.report(done, total, f"{title}: {name}")
@@ -176,11 +171,6 @@ def write(out: Path, settings: Settings, parts: Sequence[Part], provenance: dict
 
 
 def _provenance(seconds: float) -> dict[str, str]:
-    return {
-        "command": command_line(),
-        "date": call_date(),
-        "computed in": f"{seconds:.0f} s on {len(os.sched_getaffinity(0))} cores (less what was "
-        "taken up from before)",
-        "versions": f"Python {platform.python_version()}, fjr-rig {product_version()}, "
-        f"numpy {version('numpy')}, scipy {version('scipy')}, numba {version('numba')}",
-    }
+    cores = len(os.sched_getaffinity(0))
+    computed_in = f"{seconds:.0f} s on {cores} cores (less what was taken up from before)"
+    return provenance(command_line(), call_date()) | {"computed in": computed_in}

@@ -292,7 +292,7 @@ def _beforehand(effect: str) -> str:
         return _SEEN_DIRECTLY
     if not entry.starts:
         return _ONLY_A_GATE
-    if entry.scales and entry.same_as:
+    if entry.scales == "everywhere":
         return f"It is exactly {entry.same_as}."
     return ""
 

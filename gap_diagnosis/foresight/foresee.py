@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
+from fjr_kit.telling import CountedProgress
 from fjr_records.periodic import RecordedExperiment
 from fjr_records.records import RecordSet
 from fjr_sim_node import effects as fx
@@ -19,9 +20,6 @@ from .bare_parameters import bare_refit, parameters
 from .effect_limits import EffectLimits
 from .foreseen import ForeseenEffect, Foresight
 from .sight import Sight
-
-Progress = Callable[[int, int, str], None]
-"""Called with (done, all, what is being looked at)."""
 
 NOISE_UNKNOWN = (
     "The noise is not known, so limits count only what the simulation itself may be off by, 0.1 %; "
@@ -42,7 +40,7 @@ def foresee(
     tolerance: float = TOLERANCE,
     effects: Sequence[str] | None = None,
     showing: float = 1.0,
-    progress: Progress = lambda *_: None,
+    progress: CountedProgress = lambda *_: None,
 ) -> Foresight:
     """Say which parameters and effects a diagnosis of an experiment could show.
 

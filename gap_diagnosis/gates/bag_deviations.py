@@ -191,8 +191,3 @@ def _changed(model: Model, groups: Sequence[tuple[str, ...]], deviation: np.ndar
             for values, own in ((plant, [name]), (effects, _added(model, name))):
                 values |= {n: (1.0 + float(change)) * values[n] for n in own if n in values}
     return Model(plant, effects)
-
-
-def _parts(lines: np.ndarray) -> np.ndarray:
-    """Return real and imaginary parts of lines (..., lines) beside each other; DC is real."""
-    return np.concatenate([lines.real, lines[..., 1:].imag], axis=-1)

@@ -139,12 +139,12 @@ def _ends(models: Mapping[str, Model]) -> dict[str, Model]:
     return ends | ({"explained": models[names[-1]]} if len(names) > 2 else {})
 
 
-def binned(values: np.ndarray, torque: np.ndarray, bins: int = BINS) -> Curve:
-    """Return medians in bins of equally many samples; a torque that is not finite is left out."""
+def binned(values: np.ndarray, torque: np.ndarray) -> Curve:
+    """Return medians in BINS bins of as many samples; a torque that is not finite is left out."""
     finite = np.isfinite(torque) & np.isfinite(values)
     values, torque = values[finite], torque[finite]
     order = np.argsort(values, kind="stable")
-    pieces = [p for p in np.array_split(order, bins) if p.size >= _LEAST]
+    pieces = [p for p in np.array_split(order, BINS) if p.size >= _LEAST]
     return Curve(
         np.array([np.median(values[p]) for p in pieces]),
         np.array([np.median(torque[p]) for p in pieces]),

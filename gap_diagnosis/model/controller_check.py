@@ -7,7 +7,6 @@ plant: in a plant fault, whatever it is, the controller still does what it is sa
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -47,20 +46,17 @@ class ControllerCheck:
         return self.sample is None
 
 
-def check_controller(
-    realization: RecordedRealization, gains: Mapping[str, float] | None = None
-) -> ControllerCheck:
+def check_controller(realization: RecordedRealization) -> ControllerCheck:
     """Compare the torque of one bag with its control law.
 
     Args:
         realization: the bag.
-        gains: values of gains that its description leaves unknown.
 
     Raises:
         InputError: the law is not known.
     """
     description = realization.experiment
-    law = law_of(description.controller, description.sample_rate_hz, gains)
+    law = law_of(description.controller, description.sample_rate_hz)
     signals = realization.played, realization.position, realization.torque
     return check_law(law, *(signal.ravel() for signal in signals))
 

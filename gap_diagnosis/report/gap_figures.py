@@ -17,7 +17,6 @@ from fjr_kit.figure_style import (
     EXCITED,
     NOISE,
     ODD,
-    SIGMA,
     WIDTH_IN,
     Style,
     frequency_axis,
@@ -27,6 +26,7 @@ from fjr_kit.figure_style import (
     plain_values,
     stacked_axes,
 )
+from fjr_kit.number_text import SIGMA
 
 from ..where.residual_map import ResidualMap, Signal
 from ..where.residual_torque import ResidualTorque

@@ -11,13 +11,14 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
-from bla_analyzer.output import provenance
 from controller_node.pd_filtered import CONTROLLER
 from excitation_node.multisine import EXCITATION
 from fjr_interface.parameter_file import save_parameter_file
 from fjr_interface.parameters import ParameterGroup
 from fjr_kit.atomic import result_folder, write_whole
 from fjr_kit.figure_style import STYLE, save
+from fjr_kit.invocation import provenance
+from fjr_kit.telling import Progress
 from fjr_sim_node.simulation.simulator import SIMULATOR
 
 from ..how_far.run_comparison import RunComparison
@@ -42,7 +43,6 @@ GROUPS: dict[str, ParameterGroup] = {
     "simulator": SIMULATOR,
 }
 
-Progress = Callable[[str], None]
 Drawing = Callable[[], Figure]
 
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from fjr_kit.number_text import SIGMA
 from fjr_kit.plots import (
     BARRED,
     LOG,
@@ -22,7 +23,6 @@ from ..where.residual_map import KINDS, ResidualMap, Signal
 from ..where.residual_torque import ResidualTorque
 from ..where.torque_curves import COORDINATES, Coordinate, curve
 
-SIGMA = "\N{GREEK SMALL LETTER SIGMA}"
 STAGES = {"nominal": "nominal", "refit": "after the refit", "explained": "best explanation"}
 """Models in order, and what a map of each is called."""
 SCALE = [[at, f"--sigma{i}"] for i, at in enumerate((0.0, 0.34, 0.6, 0.8, 1.0))]

@@ -8,7 +8,8 @@ from functools import partial
 import numpy as np
 from matplotlib.figure import Figure
 
-from fjr_kit.figure_style import EXCITED, NOISE, ODD, SIGMA, WIDTH_IN, legend, log_values
+from fjr_kit.figure_style import EXCITED, NOISE, ODD, WIDTH_IN, legend, log_values
+from fjr_kit.number_text import SIGMA
 
 from ..how_far.run_comparison import RunComparison
 from ..outcome.cause_words import two_digits

@@ -10,6 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from fjr_kit.number_text import SIGMA
 from fjr_kit.plots import PLAIN, SECONDS, Options, Plot, extremes, layout, numbers, stack, trace
 
 from ..how_far.run_comparison import RunComparison
@@ -20,7 +21,6 @@ from .gap_level_plots import MODEL_STYLES
 
 _STEPS = ("--noise", "--model", "--level1", "--level2", "--level3", "--level4")
 _MINUS = "\N{MINUS SIGN}"
-_SIGMA = "\N{GREEK SMALL LETTER SIGMA}"
 
 
 def run_level_plots(found: RunComparison, noise_known: bool) -> dict[str, Plot]:
@@ -81,7 +81,7 @@ def _bands(found: RunComparison, noise_known: bool) -> Plot:
     names = ["0 to " + two_digits(edges[1])]
     names += [f"{two_digits(a)} to {two_digits(b)}" for a, b in pairwise(edges[1:])]
     at = np.arange(len(names), dtype=float)
-    unit = _SIGMA if noise_known else f"of the {found.compared}"
+    unit = SIGMA if noise_known else f"of the {found.compared}"
     traces = []
     for order, (name, errors) in enumerate(found.errors.items()):
         label = {"nominal": "nominal", "refit": "refit"}.get(name, f"+ {explanation([name])}")
@@ -93,7 +93,7 @@ def _bands(found: RunComparison, noise_known: bool) -> Plot:
     if noise_known:
         ends = [-0.4, len(names) - 0.6]
         traces.append(trace(ends, [1.0, 1.0], "noise", "--noise", dash="dash", hoverinfo="skip"))
-    title = f"rms error / noise ({_SIGMA})" if noise_known else f"rms error / rms {found.compared}"
+    title = f"rms error / noise ({SIGMA})" if noise_known else f"rms error / rms {found.compared}"
     axes = layout("band (Hz)", title)
     axes["yaxis"] |= {"type": "log", "tickformat": "~g", "dtick": 1}
     axes["xaxis"] |= {

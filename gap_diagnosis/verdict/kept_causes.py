@@ -5,9 +5,10 @@ from __future__ import annotations
 import itertools
 import math
 import time
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
+from fjr_kit.telling import Progress
 from fjr_sim_node import effects as fx
 
 from ..which.cell_fits import CellFitter
@@ -19,8 +20,6 @@ from ..which.seen_together import lacked
 from .judgement import FEWEST_PARTS
 from .not_named import unsure, why_not
 from .tested_causes import Tested, causes_with_tests
-
-Progress = Callable[[str], None]
 
 _MAY_BE_UNSURE = 2
 SURE = 0.8

@@ -9,15 +9,6 @@ from fjr_sim_node import effects as fx
 
 from .search_space import possible_effects
 
-_OF_AN_ANGLE = ("gravity",)
-"""What depends on the angle of a turn; of a linear axis weight is a constant force."""
-
-_OF_A_COMMAND = (
-    "delay", "actuator_lag", "torque_saturation", "torque_speed_limit", "torque_slew_limit",
-    "dead_band", "torque_constant_ripple", "torque_gain",
-)  # fmt: skip
-"""What changes a torque that is asked for; where none is, there is nothing to change."""
-
 
 def catalogue(
     nominal: Mapping[str, float],
@@ -45,8 +36,8 @@ def catalogue(
         name
         for name in possible_effects(nominal)
         if (name in asked if asked is not None else not fx.EFFECTS[name].on_request)
-        if not (linear_axis and name in _OF_AN_ANGLE)
-        if not (swings_free and name in _OF_A_COMMAND)
+        if not (linear_axis and fx.EFFECTS[name].of_a_turn)
+        if not (swings_free and fx.EFFECTS[name].of_command)
     ]
     if asked is not None and not found:
         raise InputError(

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from fjr_kit.telling import Progress
 from fjr_sim_node import effects as fx
 
 from .cell_fits import STICKING, CellFitter
@@ -24,8 +25,6 @@ _AGAIN = 8  # effects that are screened beside a cause, and those that depend on
 _LEAST_HOPE = 5.0
 """What the best start of an effect must gain, or be predicted to, to be tried at more sizes."""
 _START_LESS = 0.2  # of the greatest gain of a start: an effect whose best one gains less waits
-
-Progress = Callable[[str], None]
 
 
 class Extension:

@@ -61,7 +61,7 @@ def cell_estimates(
     """
     space, solution = fit.space, fit.solution
     prior = np.zeros(solution.x.size)
-    if "torque_gain" in fit.effects:
+    if any(fx.EFFECTS[effect].scales == "everywhere" for effect in fit.effects):
         prior[: len(space.nominal)] = (NORMAL_95 / np.log1p(space.tolerance)) ** 2
     std = standard_errors(solution.jacobian, solution.residuals, fitter.groups, prior)
     moved = moved_by_scatter(fit, fitter.runs, scatter)

@@ -16,9 +16,6 @@ from .scales import Scales
 LEAST_PASSED = 0.75
 """Ripples below which a second harmonic cannot be seen."""
 _WHOLE = 1.5  # ripples from which it is seen that they repeat
-_IF_BOUNDED = 0.75
-"""Of its presence, what is left to an effect whose fit ended at a bound of its shape: of four that
-steady periods named in the blind checks 306 to 313 one was right."""
 _IF_NONE = 0.5  # of its presence, what is left to an effect of which no part of a ripple is passed
 
 
@@ -34,12 +31,10 @@ def fewest_cycles(scales: Scales) -> float:
     return LEAST_PASSED * 2.0 * math.pi / scales.travel_rad
 
 
-def doubt_of_shape(passed: float, bounded: bool = False) -> float:
+def doubt_of_shape(passed: float) -> float:
     """Return the factor of the presence of an effect by what is seen of its shape.
 
     Args:
         passed: how many of its ripples the motion passes.
-        bounded: whether its shape is at the end of what fits try: then it may well be another law.
     """
-    seen = _IF_NONE + (1.0 - _IF_NONE) * min(passed / _WHOLE, 1.0)
-    return _IF_BOUNDED * seen if bounded else seen
+    return _IF_NONE + (1.0 - _IF_NONE) * min(passed / _WHOLE, 1.0)

@@ -11,11 +11,13 @@ that round, each with noise of its own, show how far it moves the motion and how
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
+
+from fjr_kit.telling import Progress
 
 from ..model.evidence import Evidence
 from ..model.lapped import lapped
@@ -25,8 +27,6 @@ from ..outcome.verdict_words import ROUNDING
 from .cell_fits import CellFitter
 from .comparison import NOTHING_LEFT, CellFit
 from .found import Found
-
-Progress = Callable[[str], None]
 
 STEP = f"{ROUNDING}.resolution_rad"
 """Name of the step of the encoder."""

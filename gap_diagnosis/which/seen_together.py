@@ -16,15 +16,12 @@ from fjr_sim_node import effects as fx
 
 from ..model.rig_model import Model
 
-LOADS = ("torque_bias", "gravity", "external_spring")
+_LOADS: Mapping[str, fx.Load] = {e.identifier: e.load for e in fx.CATALOGUE if e.load}
+LOADS = tuple(sorted(_LOADS, key=lambda load: len(_LOADS[load].torques(np.zeros(1)))))
 """Effects whose torque does not depend on the motion but for the angle, the plainest first."""
-LAWS: Mapping[str, Callable[[np.ndarray], np.ndarray]] = {
-    "coulomb_friction.motor_nm": lambda v: -np.sign(v),
-    "viscous_friction.motor_nm_s_rad": lambda v: -v,
-    "quadratic_friction.motor_nm_s2_rad2": lambda v: -v * np.abs(v),
-}
+LAWS: Mapping[str, fx.AtVelocity] = {p.name: p.at_velocity for p in fx.PARAMETERS if p.at_velocity}
 """Laws of friction whose torque at a velocity is proportional to their size."""
-LACKED = ("coulomb_friction", "viscous_friction")
+LACKED = tuple(effect.identifier for effect in fx.FRICTION if effect.of_bare_plant)
 """Frictions that a datasheet of inertias lacks."""
 _FALLING, _FALLS_AT = "stribeck_friction_motor.torque_nm", "stribeck_friction_motor.velocity_rad_s"
 _FALLEN = (0.01, 0.02, 0.04, 0.08, 0.16, 0.32)
@@ -197,28 +194,15 @@ def lacked(plant: Mapping[str, float]) -> frozenset[str]:
 
 def load_torques(load: str, angle: np.ndarray) -> list[np.ndarray]:
     """Return the torques of a load at angles, for sizes of one; none for no load."""
-    one = np.ones(angle.size)
-    return {
-        "": [],
-        "torque_bias": [one],
-        "gravity": [-np.sin(angle), -np.cos(angle)],
-        "external_spring": [-angle, one],
-    }[load]
+    return _LOADS[load].torques(angle) if load else []
 
 
 def load_parameters(load: str, sizes: Sequence[float]) -> dict[str, float] | None:
     """Return the parameters of a load by sizes of its torques; None for a spring that pushes."""
     if not load:
         return {}
-    if load == "torque_bias":
-        return {"torque_bias.torque_nm": sizes[0]}
-    size, other = sizes
-    if load == "gravity":
-        torque, direction = float(np.hypot(size, other)), float(np.arctan2(other, size))
-        return {"gravity.torque_nm": torque, "gravity.angle_rad": direction}
-    if not size > 0.0:
-        return None
-    return {"external_spring.stiffness_nm_rad": size, "external_spring.rest_rad": other / size}
+    found = _LOADS[load].parameters(sizes)
+    return found and {f"{load}.{name}": value for name, value in found.items()}
 
 
 def solved(

@@ -10,6 +10,8 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 
+from fjr_kit.telling import Progress
+
 from .cell_fits import CellFitter
 from .comparison import NOTHING_LEFT, CellFit
 from .exchange import drop_hindering, replace_bounded
@@ -32,8 +34,6 @@ _CERTAIN_CAUSES = 2
 _MUCH = 0.1
 """Share of the motion that an explanation misses, rms, above which something great is not found
 yet: where what promises most does not pass, what promises less is fitted, too."""
-
-Progress = Callable[[str], None]
 
 
 class Stepwise:

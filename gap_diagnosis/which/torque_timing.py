@@ -6,9 +6,10 @@ are missing, a delay does in part what they would, and half a sample of it may d
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+from fjr_kit.telling import Progress
 from fjr_records.records import RecordSet
 
 from ..model.evidence import Evidence
@@ -17,8 +18,6 @@ from ..model.rig_model import Model
 from .cell_fits import CellFitter
 from .comparison import CellFit
 from .gains import gain, stands_for
-
-Progress = Callable[[str], None]
 
 _IS_HELD = 0.2
 """Of a sample: how far from half a sample may lie what comes late of a signal that is held."""

@@ -13,7 +13,7 @@ from bla_analyzer.analysis import analyze
 from bla_analyzer.bla.fast import fast_bla
 from bla_analyzer.bla.robust import robust_bla
 from bla_analyzer.compare.metrics import ReferenceModel
-from fjr_interface.bags.reader import SignalMap
+from fjr_interface.bags.signals import SignalMap
 from fjr_interface.bags.writer import BagWriter
 from fjr_interface.experiment import Experiment
 from fjr_interface.topics import SIGNALS

@@ -130,7 +130,5 @@ def test_bad_records_are_refused():
         transient_free_spectra((r, r, r), 1, 1.0, 10)
     with pytest.raises(InputError, match="two or more whole periods"):
         transient_free_spectra((r, r, r), 3, 1.0, 10)
-    with pytest.raises(InputError, match="leaves no residual"):
-        local_polynomial_bla((r, r, r), RATE, (5.0, 20.0), half_window=3)
     with pytest.raises(InputError, match="narrow the band or record longer"):
         local_polynomial_bla((r, r, r), RATE, (0.1, 20.0))

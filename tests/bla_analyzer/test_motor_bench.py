@@ -15,7 +15,7 @@ from scipy.io import loadmat
 
 from bla_analyzer.analysis import analyze
 from bla_analyzer.results.result import LineLevels, Result
-from fjr_interface.bags.reader import SignalMap
+from fjr_interface.bags.signals import SignalMap
 from fjr_records.experiment_bag import Override
 
 N, PERIODS = 2500, 19

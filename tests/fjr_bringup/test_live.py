@@ -13,8 +13,8 @@ from fjr_bringup.campaign.chart import chart
 from fjr_bringup.campaign.live import FEWEST, LiveBla
 from fjr_bringup.campaign.plan import Campaign
 from fjr_bringup.design.measured import simulate_level
+from fjr_interface.bags.files import find_bags
 from fjr_interface.bags.folder_names import bag_folder
-from fjr_interface.bags.reader import find_bags
 
 RIG = {"excitation": {"amplitudes_rad": [0.007, 0.02], "periods": 2}}
 

@@ -157,7 +157,10 @@ def test_override_and_map_reach_the_analysis(run, folder, tmp_path):
         (("analyze", "{folder}", "--map", "speed=/x"), "signal map 'speed=/x' is not understood"),
         (("analyze", "{folder}", "--nominal", "/no.yaml"), "/no.yaml: cannot be read"),
         (("analyze", "{folder}", "--samples-per-period", "100"), "contradicts the description"),
-        (("import", "/no.csv", "--out", "/tmp/x", "--map", "reference=r"), "the map lacks torque"),
+        (
+            ("import", "/no.csv", "--out", "{folder}/new", "--map", "reference=r"),
+            "the map lacks torque",
+        ),
     ],
 )
 def test_bad_input_is_one_sentence_and_status_2(run, folder, arguments, says):

@@ -10,7 +10,8 @@ import pytest
 from paths import ROOT
 
 from fjr_cli.example import TO_TRY
-from fjr_interface.bags.reader import BagReader, find_bags
+from fjr_interface.bags.files import find_bags
+from fjr_interface.bags.reader import BagReader
 
 DOCUMENTS = (
     "README.md",

@@ -14,7 +14,8 @@ from bag_tools import (
 )
 
 from fjr_interface.bags.audit import regular_rate_hz
-from fjr_interface.bags.reader import BagReader, SignalMap, SignalSource, read_record
+from fjr_interface.bags.reader import BagReader, read_record
+from fjr_interface.bags.signals import SignalMap, SignalSource
 from fjr_interface.topics import SIGNALS
 from fjr_kit.errors import InputError
 

@@ -21,7 +21,9 @@ from mcap.writer import CompressionType, IndexType
 from paths import SHARED
 from rosbags.rosbag2 import StoragePlugin
 
-from fjr_interface.bags.reader import BagReader, Record, SignalMap, find_bags, read_record
+from fjr_interface.bags.files import find_bags
+from fjr_interface.bags.reader import BagReader, Record, read_record
+from fjr_interface.bags.signals import SignalMap
 from fjr_interface.topics import LINK_POSITION, SIGNALS
 from fjr_kit.errors import InputError
 

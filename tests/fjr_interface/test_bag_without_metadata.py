@@ -27,8 +27,9 @@ from mcap.opcode import Opcode
 from processes import completed
 from rosbags.rosbag2 import StoragePlugin
 
+from fjr_interface.bags.files import find_bags
 from fjr_interface.bags.mcap_summary import survey
-from fjr_interface.bags.reader import BagReader, find_bags, read_record
+from fjr_interface.bags.reader import BagReader, read_record
 from fjr_interface.topics import SIGNALS
 from fjr_kit.errors import InputError
 

@@ -82,6 +82,16 @@ def test_help_names_purpose_and_parameters_and_starts_nothing(
     assert max(map(len, node.output.splitlines())) <= 100
 
 
+@pytest.mark.parametrize("program", PROGRAMS, ids=" ".join)
+def test_help_that_nobody_reads_to_its_end_is_no_failure(program: tuple[str, ...]) -> None:
+    read, write = os.pipe()
+    os.close(read)
+    command = [sys.executable, "-m", *program, "--help"]
+    done = subprocess.run(command, stdout=write, stderr=subprocess.PIPE, text=True, cwd=ROOT)
+    os.close(write)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
 def test_a_program_without_parameters_has_help_too() -> None:
     assert Program("name", "What it\n    does.\n\nMore.").help().endswith("\n\nWhat it does.")
     assert "Parameters" not in Program("name", None, ParameterGroup()).help()

@@ -14,7 +14,7 @@ from rosbags.rosbag1 import Writer
 from rosbags.typesys import Stores, get_typestore
 
 from fjr_interface.bags.files import find_bags
-from fjr_interface.bags.reader import SignalMap
+from fjr_interface.bags.signals import SignalMap
 from fjr_kit.errors import InputError
 from fjr_records.records import read_records
 

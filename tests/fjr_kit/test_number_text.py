@@ -2,7 +2,7 @@
 
 import pytest
 
-from fjr_kit.number_text import formatted
+from fjr_kit.number_text import formatted, three_digits
 
 
 @pytest.mark.parametrize(
@@ -20,3 +20,8 @@ from fjr_kit.number_text import formatted
 )
 def test_what_is_below_a_million_has_no_exponent(value, form, text):
     assert formatted(value, form) == text
+
+
+def test_what_is_not_known_is_a_dash():
+    assert [three_digits(v) for v in (None, float("nan"), float("inf"))] == ["-"] * 3
+    assert [three_digits(v) for v in (0.0, 12.345, -0.00012345)] == ["0", "12.3", "-0.000123"]

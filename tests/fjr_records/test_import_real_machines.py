@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fjr_interface.bags.reader import BagReader, audit, find_bags, read_record
+from fjr_interface.bags.files import find_bags
+from fjr_interface.bags.reader import BagReader, audit, read_record
 from fjr_interface.experiment import Experiment, RecordDescription
 
 SHARED = Path(os.environ.get("FJR_SHARED", Path(__file__).parents[3] / "shared")) / "data"

@@ -12,7 +12,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fjr_interface.bags.reader import SignalMap, audit, find_bags, read_record
+from fjr_interface.bags.files import find_bags
+from fjr_interface.bags.reader import audit, read_record
+from fjr_interface.bags.signals import SignalMap
 from fjr_interface.experiment import Experiment, RecordDescription
 from fjr_kit.errors import InputError
 from fjr_records.importers import coherence

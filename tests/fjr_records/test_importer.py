@@ -11,7 +11,9 @@ import pytest
 from scipy.io import savemat
 
 from bla_analyzer.analysis import analyze
-from fjr_interface.bags.reader import LINEAR_AXIS, BagReader, SignalMap, audit, find_bags
+from fjr_interface.bags.files import find_bags
+from fjr_interface.bags.reader import LINEAR_AXIS, BagReader, audit
+from fjr_interface.bags.signals import SignalMap
 from fjr_kit.errors import InputError
 from fjr_records.importers.import_map import Column, parse_harmonics, parse_map
 from fjr_records.importers.importer import import_files

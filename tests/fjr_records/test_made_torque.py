@@ -9,8 +9,9 @@ from controller_node import pd_filtered
 from fjr_interface.experiment import RecordDescription
 from fjr_kit.errors import InputError
 from fjr_records.importers.import_map import parse_map
-from fjr_records.importers.importer import ImportOptions, Understood, read_files
+from fjr_records.importers.importer import Understood, read_files
 from fjr_records.importers.made_torque import MADE, ONCE
+from fjr_records.importers.record_file import ImportOptions
 from fjr_sim_node import plant
 from fjr_sim_node.plant import PLANT
 from fjr_sim_node.simulation import closed_loop

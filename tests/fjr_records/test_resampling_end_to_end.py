@@ -13,7 +13,9 @@ from typer.testing import CliRunner
 from bla_analyzer.analysis import analyze
 from bla_analyzer.results.result import LevelResult, Result
 from fjr_cli.app import app
-from fjr_interface.bags.reader import BagReader, SignalMap, find_bags, read_record
+from fjr_interface.bags.files import find_bags
+from fjr_interface.bags.reader import BagReader, read_record
+from fjr_interface.bags.signals import SignalMap
 from fjr_interface.experiment import Experiment
 from fjr_interface.resampling.accuracy import Resampling
 from fjr_kit.errors import InputError

@@ -7,7 +7,8 @@ from fjr_interface.bags.reader import SPEED
 from fjr_interface.experiment import RecordDescription
 from fjr_kit.errors import InputError
 from fjr_records.importers.import_map import parse_map
-from fjr_records.importers.importer import ImportOptions, import_files
+from fjr_records.importers.importer import import_files
+from fjr_records.importers.record_file import ImportOptions
 from fjr_records.record_noise import record_noise
 from fjr_records.records import Record, RecordSet, read_records
 from gap_diagnosis.model.lapped import lapped

@@ -9,7 +9,8 @@ import pytest
 
 from fjr_kit.errors import InputError
 from fjr_records.importers.import_map import UNITS, parse_map
-from fjr_records.importers.importer import ImportOptions, read_files
+from fjr_records.importers.importer import read_files
+from fjr_records.importers.record_file import ImportOptions
 from fjr_records.importers.stated_units import stated_unit
 
 RATE = 100.0

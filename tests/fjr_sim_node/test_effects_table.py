@@ -124,6 +124,9 @@ from fjr_sim_node.plant import PLANT
 from fjr_sim_node.simulation.simulator import SIMULATOR, run_realization
 from fjr_interface.parameter_file import load_parameter_file
 from fjr_bringup.campaign.plan import Campaign
+from fjr_export.exporting import export
+from fjr_export.treatments import TARGETS, TITLES, table
+from fjr_kit.errors import InputError
 from fjr_records.periodic import RecordedExperiment, RecordedRealization
 from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.model.steady_runs import steady_runs
@@ -136,6 +139,15 @@ assert SIMULATOR[name].unit == "N m s3/rad3"
 assert load_parameter_file("rig.yaml")["simulator"][name] == 2.0
 assert "**`cubic_drag`**" in document.table()
 assert unit_of(name) == "N m s3/rad3" and explanation(["cubic_drag"]) == "cubic drag"
+assert "| `cubic_drag` | refused: it is not expressed in MuJoCo so far |" in table()
+for target in TARGETS:
+    try:
+        export("bare.yaml", target, target)
+    except InputError as error:
+        assert f"cubic_drag: it is not expressed in {TITLES[target]} so far" in str(error)
+    else:
+        raise AssertionError(target)
+    export("bare.yaml", target, target, without=["cubic_drag"])
 campaign = Campaign.create("rig.yaml", {"excitation": {
     "amplitudes_rad": (5e-3,), "realizations": 2, "periods": 2, "transient_periods": 1,
     "base_frequency_hz": 0.5, "f_min_hz": 0.5, "f_max_hz": 30.0},
@@ -159,7 +171,7 @@ assert fitter.gains(found, refit).sum() > 10.0
 
 
 def test_a_new_effect_is_one_entry_and_its_law(tmp_path: Path) -> None:
-    """Node parameter, parameter file, fit, document and report words have it, and it is found."""
+    """Node parameter, file, fit, document and words have it; it is found; exports refuse it."""
     for package in PACKAGES:
         shutil.copytree(ROOT / package, tmp_path / package, ignore=shutil.ignore_patterns("__py*"))
     table = tmp_path / "fjr_sim_node/effects/friction.py"
@@ -169,9 +181,10 @@ def test_a_new_effect_is_one_entry_and_its_law(tmp_path: Path) -> None:
     law = tmp_path / "fjr_sim_node/plant/torques.py"
     assert law.read_text().count(LAW) == 1
     law.write_text(law.read_text().replace(LAW, NEW_LAW))
-    (tmp_path / "rig.yaml").write_text(
-        "/rig/simulator:\n  ros__parameters:\n    cubic_drag:\n      nm_s3_rad3: 2.0\n"
-    )
+    rig = "/rig/simulator:\n  ros__parameters:\n    cubic_drag:\n      nm_s3_rad3: 2.0\n"
+    (tmp_path / "rig.yaml").write_text(rig)
+    linear = dict.fromkeys(("fs", "fsm", "k1"), 0.0)
+    (tmp_path / "bare.yaml").write_text(rig + "".join(f"    {n}: {v}\n" for n, v in linear.items()))
     places = {"PYTHONPATH": str(tmp_path), "XDG_CACHE_HOME": str(tmp_path)}
     environment = {**os.environ, **places, "NUMBA_OPT": "1"}  # all kernels are compiled anew
     done = subprocess.run(

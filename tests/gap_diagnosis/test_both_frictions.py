@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from fjr_records.importers.import_map import parse_map
-from fjr_records.importers.importer import ImportOptions, import_files
+from fjr_records.importers.importer import import_files
+from fjr_records.importers.record_file import ImportOptions
 from fjr_records.records import read_records
 from fjr_sim_node.simulation.closed_loop import simulate_law
 from gap_diagnosis.model.evidence import Evidence

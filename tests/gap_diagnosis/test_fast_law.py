@@ -9,7 +9,8 @@ from controller_node.law import law_of
 from fjr_cli.import_summary import _law
 from fjr_kit.errors import InputError
 from fjr_records.importers.import_map import parse_map
-from fjr_records.importers.importer import ImportOptions, import_files, read_files
+from fjr_records.importers.importer import import_files, read_files
+from fjr_records.importers.record_file import ImportOptions
 from fjr_sim_node.simulation.closed_loop import simulate
 from gap_diagnosis import diagnose
 from gap_diagnosis.model.rig_model import Model

@@ -9,7 +9,7 @@ from effect_rig import relative_rms
 from gap_cases import fitter_of, found_in, simulate_case, write_bags
 
 from controller_node import pd_filtered
-from fjr_interface.bags.reader import SignalMap
+from fjr_interface.bags.signals import SignalMap
 from fjr_records.periodic import read_experiment
 from fjr_sim_node import effects, plant
 from fjr_sim_node.plant import PLANT
@@ -23,7 +23,9 @@ from gap_diagnosis.report.updated_parameters import simulator_values
 from gap_diagnosis.where.residual_map import residual_map
 from gap_diagnosis.which.catalogue import catalogue
 from gap_diagnosis.which.equivalents import partners
-from gap_diagnosis.which.search_space import Scales, starts
+from gap_diagnosis.which.scales import Scales
+from gap_diagnosis.which.search_space import starts
+from gap_diagnosis.which.seen_together import LACKED, LAWS, LOADS
 
 NOMINAL = PLANT.defaults()
 LEAD_WITH_INTEGRATOR = {
@@ -212,8 +214,9 @@ def test_a_held_link_stays_where_it_is():
     assert relative_rms(near, far) < 1e-6 and relative_rms(torque, other) < 1e-6
     assert simulator_values(held.plant) == {**NOMINAL, **HELD, "fs": 0.0, "fv": 0.0}
     frequency = np.linspace(0.5, 50.0, 100)
-    response = linear.continuous_g0({**NOMINAL, **HELD}, frequency)
+    a, b = linear.state_space({**NOMINAL, **HELD})
     s = 2j * np.pi * frequency
+    response = np.array([np.linalg.solve(each * np.eye(4) - a, b)[2] for each in s])
     own = 1.0 / (NOMINAL["jm"] * s**2 + NOMINAL["fvm"] * s + NOMINAL["k0"])
     assert np.allclose(response, own, rtol=1e-12)
 
@@ -302,6 +305,26 @@ def test_a_cubic_stiffness_that_the_nominal_lacks_is_a_cause():
     assert fitter.misfit(found.best) < 1.5
     own = simulator_values({**found.best.model.plant, **found.best.model.effects})
     assert own["k1"] == pytest.approx(case.rig["k1"], rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("rig", "goes_with"), [("linear_axis", "of_a_turn"), ("swings_free", "of_command")]
+)
+def test_what_an_effect_goes_with_stands_in_its_entry(monkeypatch, rig, goes_with):
+    assert "backlash" in catalogue(NOMINAL, **{rig: True})
+    entry = replace(effects.EFFECTS["backlash"], **{goes_with: True})
+    monkeypatch.setitem(effects.EFFECTS, "backlash", entry)
+    assert "backlash" in catalogue(NOMINAL)
+    assert "backlash" not in catalogue(NOMINAL, **{rig: True})
+
+
+def test_loads_and_frictions_that_are_seen_together_are_those_of_the_table():
+    assert LOADS == ("torque_bias", "gravity", "external_spring")
+    assert LACKED == ("coulomb_friction", "viscous_friction")
+    assert [name.split(".")[0] for name in LAWS] == [*LACKED, "quadratic_friction"]
+    of_command = {e.identifier for e in effects.CATALOGUE if e.of_command}
+    of_drive = {e.identifier for e in effects.CATALOGUE if e.acts_on == "drive"}
+    assert of_drive - of_command == {"torque_bias", "cogging"} and of_command < of_drive
 
 
 def test_weight_on_a_linear_axis_is_a_constant_force():

@@ -11,7 +11,6 @@ from gap_cases import SHORT, fitter_of, simulate_case
 from fjr_sim_node.plant import PLANT
 from gap_diagnosis.any_record import investigate
 from gap_diagnosis.which.presence import at_its_bound
-from gap_diagnosis.which.ripples_passed import doubt_of_shape
 
 SMOOTH = {**PLANT.defaults(), "fvm": 0.0, "fv": 0.0}
 """A datasheet without viscous friction."""
@@ -32,7 +31,7 @@ def test_two_effects_that_nearly_replace_each_other_are_both_found(case):
     assert sizes["viscous_friction.motor_nm_s_rad"].value == pytest.approx(6.0, rel=0.02)
 
 
-def test_a_law_whose_shape_ends_at_a_bound_may_be_another_law(case):
+def test_a_shape_that_ends_at_a_bound_is_told_from_one_inside(case):
     fitter = fitter_of(case.recorded)
     refit = fitter.refit()
     seed = {
@@ -47,4 +46,3 @@ def test_a_law_whose_shape_ends_at_a_bound_may_be_another_law(case):
     at_end = np.append(x[:-1], space.bounds()[1][-1])
     ended = replace(inside, solution=replace(refit.solution, x=at_end))
     assert not at_its_bound(inside, "extra_mode") and at_its_bound(ended, "extra_mode")
-    assert doubt_of_shape(np.inf, bounded=True) < 0.8 < doubt_of_shape(np.inf)

@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from controller_node.transfer_function import TransferFunction
 from fjr_interface.experiment import RecordDescription
 from fjr_records.importers.import_map import parse_map
-from fjr_records.importers.importer import ImportOptions, import_files
+from fjr_records.importers.importer import import_files
+from fjr_records.importers.record_file import ImportOptions
 from fjr_records.records import Record, RecordSet
 from fjr_sim_node.plant import coefficients
 from fjr_sim_node.simulation.closed_loop import simulate_law

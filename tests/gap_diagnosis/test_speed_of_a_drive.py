@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from fjr_records.importers.import_map import parse_map
-from fjr_records.importers.importer import ImportOptions, import_files
+from fjr_records.importers.importer import import_files
+from fjr_records.importers.record_file import ImportOptions
 from gap_diagnosis.any_record import diagnose
 
 RATE, SECONDS, SUBSTEPS = 400, 15, 8

@@ -13,7 +13,8 @@ from scipy.signal import chirp
 
 from fjr_interface.experiment import RecordDescription
 from fjr_records.importers.import_map import parse_map
-from fjr_records.importers.importer import ImportOptions, import_files
+from fjr_records.importers.importer import import_files
+from fjr_records.importers.record_file import ImportOptions
 from fjr_records.records import Record, RecordSet
 from gap_diagnosis.any_record import investigate, read_any
 from gap_diagnosis.model.evidence import Evidence
