@@ -1,6 +1,6 @@
 """A BLA beside reference models.
 
 `metrics` is the distance V (paper eq. 14), `reference_models` the linear models of the nominal rig,
-`two_inertia` finds antiresonance and resonance of a BLA, `optimum` the best amplitude of an
-experiment; `bootstrap` gives intervals by resampling realizations.
+`optimum` finds the best amplitude of an experiment, `bootstrap` gives intervals by resampling
+realizations.
 """

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from bla_analyzer.compare.two_inertia import Resonances
 from fjr_kit.tasks import Arrays
 
 from .fig4 import sweep
@@ -16,6 +15,7 @@ from .part import Statement, Table, repeats
 from .prediction import difference
 from .resonance import fit_level
 from .settings import ALMOST_DB2, SMALL_RAD, Settings
+from .two_inertia import Resonances
 
 RMS_READING = float(np.sqrt(2.0))
 """Peak over rms of a line: the paper does not say of which its 1 mrad speaks."""

@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from bla_analyzer.compare.two_inertia import NAMES, Resonances, fit_resonances
 from fjr_kit.tasks import Arrays
 from fjr_sim_node.plant import PLANT
 from fjr_sim_node.theory.linear import g0
+
+from .two_inertia import NAMES, Resonances, fit_resonances
 
 _RATE_HZ = 1000.0  # of the experiments whose levels are fitted
 

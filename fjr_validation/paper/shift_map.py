@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from bla_analyzer.compare.two_inertia import Resonances
 from bla_analyzer.results.summary import decibel
 from fjr_kit.plots import BARRED, LOG, Options, layout
 from fjr_kit.tasks import Arrays
@@ -18,6 +17,7 @@ from .fig4 import sweep
 from .part import Part, PlotPlace, Statement, Table
 from .resonance import fit_level
 from .settings import COLORS, NAMES, Settings
+from .two_inertia import Resonances
 
 MAPPED = ("both", "transmission", "friction")
 LINEAR_HZ = (11.254, 17.794)

@@ -12,7 +12,6 @@ from processes import Starter
 from rich.console import Console
 from typer.testing import CliRunner
 
-from bla_analyzer.compare.two_inertia import fit_resonances
 from fjr_cli.app import app
 from fjr_kit.errors import InputError
 from fjr_kit.tasks import Task, run_tasks
@@ -34,6 +33,7 @@ from fjr_validation.paper import reproduction as paper_run
 from fjr_validation.paper.levels import distances, measure, models, variant
 from fjr_validation.paper.resonance import fit_level, two_inertia_frf
 from fjr_validation.paper.settings import QUICK
+from fjr_validation.paper.two_inertia import fit_resonances
 
 pytestmark = pytest.mark.slow
 
