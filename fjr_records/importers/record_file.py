@@ -11,7 +11,7 @@ import numpy as np
 from controller_node.transfer_function import TransferFunction
 from fjr_kit.errors import InputError
 
-from ..driven import wrong_sign
+from ..driven import opposes, wrong_sign
 from ..units import may_stick
 from . import coherence, part
 from .columns import read_columns
@@ -244,9 +244,10 @@ def understand(
     doubts = samples.doubts + _unit_doubts(path, signals, repetition, columns)
     if not (np.ptp(signals["u"]) > 0 or options.swings_free):
         doubts += ("the torque is constant, so no response can be told from this run",)
-    brakes = wrong_sign(signals["u"], signals["y"])
-    if brakes is not None:
-        doubts += (f"{brakes}: --map torque=-COLUMN turns it",)
+    if (against := wrong_sign(signals["u"], signals["y"])) is not None:
+        doubts += (f"{against}: --map torque=-COLUMN or position=-COLUMN turns it",)
+    if "r" in signals and (against := opposes(signals["r"], signals["y"])) is not None:
+        doubts += (f"{against}: --map reference=-COLUMN or position=-COLUMN turns it",)
     other = coherence.unrelated(signals, repetition)
     if other is not None:
         raise InputError(f"{path}: {other}.")

@@ -121,7 +121,7 @@ def test_a_stated_length_makes_the_axis_linear(tmp_path):
 
 def test_a_current_and_counts_need_a_factor(tmp_path):
     file = table(tmp_path / "run.csv", ("t", "I [A]", "y [counts]"))
-    with pytest.raises(InputError, match=r"torque is mapped to I \[A\], .* in A; give the unit, or the factor"):
+    with pytest.raises(InputError, match=r"torque is mapped to I \[A\], .* in A; give the unit"):
         understood([file], "torque=I [A]", "position=y [counts]:0.01", "time=t")
     with pytest.raises(InputError, match=r"position=y \[counts\]:0\.25"):
         understood([file], "torque=I [A]:0.5", "position=y [counts]", "time=t")
@@ -152,7 +152,7 @@ def test_the_summary_says_whose_unit_it_is(run, tmp_path):
 def test_a_unit_that_is_not_known_is_refused_in_brackets_and_in_a_row(tmp_path):
     for names, units in ((("t", "u", "y [furlong]"), None), (("t", "u", "y"), ("s", "Nm", "xyz"))):
         file = table(tmp_path / "run.csv", names, units=units)
-        with pytest.raises(InputError, match="which the file says to be in (furlong|xyz); give"):
+        with pytest.raises(InputError, match=r"which the file says to be in (furlong|xyz); give"):
             understood([file], "torque=u", "position=2", "time=t")
         (record,) = understood([file], "torque=u", "position=2:deg", "time=t").records
         np.testing.assert_allclose(record.signals["y"], Y, rtol=1e-7, atol=1e-9)
