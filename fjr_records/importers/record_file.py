@@ -12,7 +12,7 @@ from controller_node.transfer_function import TransferFunction
 from fjr_kit.errors import InputError
 
 from ..driven import opposes, wrong_sign
-from ..units import may_stick
+from ..units import may_stick, unit_taken_for_rad
 from . import coherence, part
 from .columns import read_columns
 from .import_map import OWN_TIME, TIME, Column, is_time, refuse_both_axes
@@ -276,6 +276,7 @@ def _unit_doubts(
         if doubt is None:
             continue
         meant = columns[one].by_factor or columns[other].by_factor
+        meant = meant or (one == "link" and unit_taken_for_rad(max(ratio, 1.0 / ratio)) is None)
         if not (meant or (one == "position" and may_stick(ratio))):
             raise InputError(f"{path}: {doubt}.")
         doubts.append(doubt)

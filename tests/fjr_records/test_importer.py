@@ -152,6 +152,19 @@ def test_degrees_taken_for_rad_are_refused_unless_a_factor_says_that_they_are_me
     assert run("import", tmp_path / "rig.npz", *right).stderr == ""
 
 
+@pytest.mark.parametrize(
+    ("per_rad", "says"),
+    [(1e5, r"in counts of an encoder, .* position=COLUMN:FACTOR"),
+     (4096 / 6.283, "COLUMN:mrad, or position=COLUMN:FACTOR if it counts encoder steps")],
+)  # fmt: skip
+def test_counts_of_an_encoder_taken_for_rad_are_refused(tmp_path, run, per_rad, says):
+    values = record()
+    np.savez(tmp_path / "rig.npz", **{**values, "y": np.round(2.0 * per_rad * values["y"])})
+    words = ("--sample-rate-hz", RATE_HZ, "--map", "reference=r,torque=u,position=y")
+    done = run("import", tmp_path / "rig.npz", "--out", tmp_path / "a", *words)
+    assert done.exit_code == 2 and re.search(says, " ".join(done.stderr.split())), done.stderr
+
+
 def test_a_linear_axis_is_told_by_its_units_and_every_result_says_so(tmp_path, run):
     values = record()
     values["y"], values["r"] = 1e3 * values["y"], 1e3 * values["r"]
