@@ -18,6 +18,7 @@ from fjr_kit.errors import InputError, shown
 
 from .clock_stamps import is_stamp, rejoined, since
 from .source import Heading, Names, read_text
+from .table_head import Head, head_of
 
 _DELIMITERS = ("\t", ";", ",", "|", None)
 """None stands for white space."""
@@ -26,6 +27,9 @@ _LOOKED_AT = 100
 """Lines that tell delimiter and decimal mark."""
 _LABVIEW = "Comment"
 """Name of a last column in LabVIEW's measurement files, whose rows say nothing there."""
+_PROSE = 3
+"""Lines above a table that may name its columns though they are comments, or white space parts
+them: further up such lines are prose."""
 _MOST_COLUMNS = 100_000
 _NOWHERE = 2**62
 """Number of a line that no file has."""
@@ -92,7 +96,8 @@ class _Grid:
             return cls(layout, 0, ())
         width = max(counts, key=lambda w: (counts[w], w))
         fitting = [row for row in held if len(row) == width]
-        often = [2 * sum(column) >= len(fitting) for column in zip(*fitting, strict=True)]
+        rows_of_table = fitting[len(fitting) // 2 :]  # the lines above it may hold numbers, too
+        often = [2 * sum(of) >= len(rows_of_table) for of in zip(*rows_of_table, strict=True)]
         return cls(layout, width, tuple(np.flatnonzero(often)))
 
     def is_row(self, cells: Sequence[str]) -> bool:
@@ -111,8 +116,9 @@ class _Grid:
         headed = self.width > 1 and any(len(names) == self.width for names in above[-2:])
         share = len(self.numbers) / max(self.width, 1)
         named = max(map(len, above), default=0)
+        parted = any(found) and self.layout.delimiter is not None
         rank = -_LAYOUTS.index(self.layout)
-        return sum(found), headed, len(self.numbers), share, named, rank
+        return sum(found), headed, len(self.numbers), share, parted, named, rank
 
 
 _LAYOUTS = tuple(
@@ -131,8 +137,9 @@ def open_text(path: Path) -> Names:
         )
     grid = max((_Grid.of(one, first) for one in _LAYOUTS), key=lambda one: one.fitness(first))
     layout = grid.layout
-    start, names, units = _start(grid, text)
-    places = {name: at for at, name in reversed(list(enumerate(names)))}
+    start, head = _start(grid, text)
+    names, units = head.names, head.units
+    places = {**head.others, **{name: at for at, name in reversed(list(enumerate(names)))}}
     numbers = [each for at in range(len(names)) for each in (str(at), f"[{at}]")]
     stamps = _stamps(layout, text, start)
     origin = next(iter(stamps.values()), "")
@@ -155,7 +162,8 @@ def open_text(path: Path) -> Names:
         columns = len(names)
         return _column(path, layout, text, start, index, columns, name, origin=origin, holes=holes)
 
-    return Names(path, listed, find, [*numbers, *twice], headings, partial(find, holes=True))
+    unlisted = [*numbers, *twice, *head.others]
+    return Names(path, listed, find, unlisted, headings, partial(find, holes=True))
 
 
 def _columns_at_most(line: str) -> int:
@@ -185,31 +193,33 @@ def _uncommented(line: str) -> str:
     return line.strip(" \r\n").lstrip("#%/! ")
 
 
-def _start(grid: _Grid, text: str) -> tuple[int, list[str], list[str]]:
-    """Return the number of the first line of numbers, the names of the columns, and their units.
+def _start(grid: _Grid, text: str) -> tuple[int, Head]:
+    """Return the number of the first line of numbers, and what the lines above call the columns.
 
-    The names stand in one of the two lines above, the other may hold units, else none are
-    returned; without names the columns are numbered. A line above in which some cells are numbers
-    is a damaged row.
+    A line right above that begins with a number is a damaged row.
     """
     layout, above = grid.layout, list[tuple[int, list[str], bool]]()
     for number, line in _lines(text, _LOOKED_AT):
-        if not grid.is_row(layout.cells(line)) or _is_comment(line):
-            names = [cell.strip("# %") for cell in layout.cells(_uncommented(line))]
-            names = names[:-1] if names[-1:] in ([_LABVIEW], [""]) else names
-            above = [*above[-1:], (number, names, _is_comment(line))]
-            continue
-        columns = grid.width - (not layout.cells(line)[-1])  # without one after the last delimiter
-        fitting = [each for each in above if len(each[1]) in (columns, grid.width)]
-        for row, names, comment in fitting:
-            if not comment and any(layout.holds(names[at]) for at in grid.numbers):
-                return row, [str(index) for index in range(columns)], []
-        if fitting:
-            return number, fitting[0][1], fitting[1][1] if len(fitting) > 1 else []
-        if above and not above[0][2] and layout.delimiter is not None and len(above[0][1]) > 1:
-            return number, above[0][1], []  # the rows are said to be too short or too long
-        return number, [str(index) for index in range(columns)], []
-    return _NOWHERE, above[0][1] if above else [], []
+        if grid.is_row(layout.cells(line)) and not _is_comment(line):
+            break
+        cells = [cell.strip("# %") for cell in layout.cells(_uncommented(line))]
+        cells = cells[:-1] if cells[-1:] in ([_LABVIEW], [""]) else cells
+        above.append((number, cells, _is_comment(line)))
+    else:
+        return _NOWHERE, Head(above[-2:][0][1] if above else [])
+    columns = grid.width - (not layout.cells(line)[-1])  # without one after the last delimiter
+    widths = (columns, grid.width)
+    while above and not above[-1][2] and len(above[-1][1]) in widths:
+        if not layout.holds(above[-1][1][grid.numbers[0]]):
+            break
+        number = above.pop()[0]
+    nearest = above[-_PROSE:]
+    lines = [one for one in above if one in nearest or (layout.delimiter and not one[2])]
+    head = head_of([cells for _, cells, _ in lines], widths, layout.is_number)
+    last = above[-2:]
+    if not head.names and last and not last[0][2] and layout.delimiter and len(last[0][1]) > 1:
+        return number, Head(last[0][1])  # the rows are said to be too short or too long
+    return number, head if head.names else Head(list(map(str, range(columns))))
 
 
 def _stamps(layout: _Layout, text: str, start: int) -> dict[int, str]:
