@@ -9,8 +9,9 @@ hold) and `importer.write_bags`.
   `source` is what they share, `table_head` reads the lines above a table in text. `record_file`
   reads one file and says what is doubtful in it.
 - Stamps: `timing` decides when samples were taken and brings them onto an even grid by `stamps`;
-  `clock_stamps` reads calendar and clock, `own_stamps` signals that were not sampled together;
-  `part` cuts the part that is asked for.
+  `rounded_stamps` finds the even samples behind coarse stamps, `clock_stamps` reads calendar and
+  clock, `own_stamps` signals that were not sampled together; `part` cuts the part that is asked
+  for.
 - Signals: `wraps` adds the turns that an encoder leaves out, `integrals` makes angles of speeds,
   `made_torque` the torque of a described controller.
 - The kind of run: `repetition` and `coherence` say whether a run is periodic and whether its

@@ -1,7 +1,4 @@
-"""What one time column says: even, coarse, jittered or wild stamps.
-
-Stamps that lie on a straight line up to their own resolution are even ones that were rounded.
-"""
+"""What one time column says: even, coarse, jittered or wild stamps."""
 
 from __future__ import annotations
 
@@ -10,6 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fjr_kit.errors import InputError
+
+from .rounded_stamps import Rounded, rounded
 
 FASTEST_HZ = 1e6
 """Greatest sample rate of an experiment description."""
@@ -24,8 +23,10 @@ FEW = 0.01
 UNEVEN = 0.01
 """Greatest deviation of one time step from the mean one, relative to it, of even stamps."""
 _GAP = 1.5
-_ROUNDING = 0.75
-"""Greatest distance of rounded stamps from a straight line, in units of their last digit."""
+_KNOWN = 0.05
+"""Greatest range of the sample rates that rounded stamps allow, relative to the rate."""
+GIVE_RATE = "where samples were taken evenly, leave time=COLUMN out and give --sample-rate-hz"
+"""What helps where stamps are coarser than the samples."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,12 @@ class Clock:
 
 
 def read_clock(
-    source: str, time: np.ndarray | None, given_hz: float | None, *, slow: bool = False
+    source: str,
+    time: np.ndarray | None,
+    given_hz: float | None,
+    *,
+    slow: bool = False,
+    copies: bool = False,
 ) -> Clock:
     """Understand a time column of a file.
 
@@ -59,9 +65,10 @@ def read_clock(
         time: the time column in s, (samples,); None without one.
         given_hz: sample rate that the user gave.
         slow: whether it may be slower than SLOWEST_HZ.
+        copies: whether samples that repeat a stamp are copies of the sample before.
 
     Raises:
-        InputError: it is no time, or not in s.
+        InputError: it is no time, or not in s, or too coarse to tell the rate.
     """
     if time is None:
         if given_hz is None:
@@ -87,15 +94,28 @@ def read_clock(
     _refuse_slow(source, time, slow)
     stretch = _longest_stretch(steps)
     if stretch is not None:
-        return _of_stretch(source, time, given_hz, stretch, slow)
+        return _of_stretch(source, time, given_hz, stretch, slow, copies)
     if (np.abs(steps - step) <= UNEVEN * step).all():
         return Clock(None, _same(source, _whole(1.0 / step, 1e-6), given_hz))
-    rounded = _rounded_rate(time)
-    if rounded is not None:
-        rate, digit = rounded
-        note = f"its stamps are rounded to {digit:g} s and taken as even, {rate:.6g} samples/s"
-        return Clock(None, _same(source, rate, given_hz), notes=(note,))
-    return _uneven(source, time, given_hz)
+    behind = rounded(time, copies=copies)
+    return _uneven(source, time, given_hz) if behind is None else _even(source, behind, given_hz)
+
+
+def _even(source: str, behind: Rounded, given_hz: float | None) -> Clock:
+    """Return the timing of even samples with rounded stamps; raise InputError if it is not told."""
+    least, most = behind.least_hz, behind.most_hz
+    if given_hz is None and most - least > _KNOWN * behind.rate_hz:
+        raise InputError(
+            f"{source}: the time column is rounded to {behind.tick_s:.6g} s and allows any rate "
+            f"from {least:.3g} to {most:.3g} Hz; {GIVE_RATE}."
+        )
+    fits = given_hz is not None and least <= given_hz <= most
+    rate = given_hz if given_hz and fits else _same(source, behind.rate_hz, given_hz)
+    allowed = f" (they allow {least:.6g} to {most:.6g})" if most - least > 1e-6 * rate else ""
+    note = (
+        f"its stamps are rounded to {behind.tick_s:.6g} s and taken as even, {rate:.6g} samples/s"
+    )
+    return Clock(None, rate, notes=(note + allowed,))
 
 
 def _refuse_slow(source: str, time: np.ndarray, slow: bool) -> None:
@@ -122,10 +142,15 @@ def _longest_stretch(steps: np.ndarray) -> slice | None:
 
 
 def _of_stretch(
-    source: str, time: np.ndarray, given_hz: float | None, stretch: slice, slow: bool
+    source: str,
+    time: np.ndarray,
+    given_hz: float | None,
+    stretch: slice,
+    slow: bool,
+    copies: bool,
 ) -> Clock:
     """Return the timing of one stretch of a file, which is kept alone."""
-    of_stretch = read_clock(source, time[stretch], given_hz, slow=slow)
+    of_stretch = read_clock(source, time[stretch], given_hz, slow=slow, copies=copies)
     steps = np.diff(time)
     gaps = steps[steps > LONG_GAP * np.median(steps[steps > 0])]
     kept = np.arange(time.size)[stretch]
@@ -149,10 +174,14 @@ def _uneven(source: str, time: np.ndarray, given_hz: float | None) -> Clock:
     kept = np.concatenate([[True], np.diff(time) > 0])
     notes: tuple[str, ...] = ()
     if not kept.all():
-        notes = (f"{np.sum(~kept)} samples repeat the stamp before them and are left out",)
+        most = f"; {GIVE_RATE}" if 2 * kept.sum() < kept.size else ""
+        notes = (f"{np.sum(~kept)} samples repeat the stamp before them and are left out{most}",)
     stamps = time[kept]
     if stamps.size < 3:
-        raise InputError(f"{source}: the time column has {stamps.size} different stamps; too few.")
+        raise InputError(
+            f"{source}: the time column has {stamps.size} different stamps; too few to tell a "
+            f"rate; {GIVE_RATE}."
+        )
     steps = np.diff(stamps)
     usual = float(np.median(steps))
     gaps = steps[steps > _GAP * usual]
@@ -174,20 +203,3 @@ def _same(source: str, rate: float, given: float | None) -> float:
 
 def _whole(rate: float, tolerance: float) -> float:
     return float(round(rate)) if abs(rate - round(rate)) < tolerance * rate else rate
-
-
-def _rounded_rate(time: np.ndarray) -> tuple[float, float] | None:
-    """Return rate and last digit (s) of stamps that are even but for their rounding, else None."""
-    digit = next((d for d in 10.0 ** -np.arange(0, 10) if _multiples(time, d)), None)
-    if digit is None:
-        return None
-    k = np.arange(time.size) - (time.size - 1) / 2.0
-    slope = float(k @ time / (k @ k))
-    if np.abs(time - time.mean() - slope * k).max() > _ROUNDING * digit:
-        return None
-    return _whole(1.0 / slope, 4.0 * digit / (time[-1] - time[0])), float(digit)
-
-
-def _multiples(time: np.ndarray, digit: float) -> bool:
-    counts = time / digit
-    return bool((np.abs(counts - np.rint(counts)) < 1e-4).all())

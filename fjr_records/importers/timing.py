@@ -7,7 +7,7 @@ all, samples are joined by straight lines. The error is stated either way.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -17,7 +17,7 @@ from fjr_interface.resampling.accuracy import LEAST_SAMPLES, Survey
 from fjr_interface.resampling.grid_stream import Grid, GridStream
 from fjr_kit.errors import InputError
 
-from .stamps import Clock, read_clock
+from .stamps import GIVE_RATE, Clock, read_clock
 
 GREATEST_ERROR = 0.2
 """Greatest rms error of the position by straight lines, relative to its rms; with stamps of its
@@ -70,7 +70,8 @@ def of_one_clock(
     Raises:
         InputError: it is no time, or not in s.
     """
-    clock = read_clock(str(path), time, given_hz, slow=slow)
+    copies = time is not None and _copies(time, values.values())
+    clock = read_clock(str(path), time, given_hz, slow=slow, copies=copies)
     used = {q: each if clock.kept is None else each[clock.kept] for q, each in values.items()}
     stamps = {} if clock.stamps_s is None else dict.fromkeys(used, clock.stamps_s)
     return used, Timing(clock.rate_hz, stamps, clock.gaps, clock.longest_gap_s, clock.notes)
@@ -100,7 +101,8 @@ def of_own_clocks(
         InputError: stamps are no time, not in s, or have no time in common.
     """
     clocks = {
-        q: read_clock(f"{path}: {q}", time, None, slow=q in slow) for q, time in times.items()
+        q: read_clock(f"{path}: {q}", time, None, slow=q in slow, copies=_copies(time, [values[q]]))
+        for q, time in times.items()
     }
     used, stamps = {}, {}
     for quantity, clock in clocks.items():
@@ -125,6 +127,12 @@ def of_own_clocks(
     gaps = sum(clock.gaps for clock in clocks.values())
     rate = given_hz or min(rates)
     return used, Timing(rate, stamps, gaps, longest.longest_gap_s, tuple(notes))
+
+
+def _copies(time: np.ndarray, values: Iterable[np.ndarray]) -> bool:
+    """Tell whether samples that repeat a stamp repeat all signals as well; each (samples,)."""
+    repeats = np.diff(time) == 0
+    return bool(repeats.any()) and not any(np.diff(each)[repeats].any() for each in values)
 
 
 def _instants(clock: Clock, time: np.ndarray) -> np.ndarray:
@@ -215,7 +223,7 @@ def _by_lines(
         if limited and relative > GREATEST_ERROR:
             raise InputError(
                 f"{why.rstrip('.')}; nor do straight lines between the samples do: their error is "
-                f"{relative:.0%} of the {name}'s rms."
+                f"{relative:.0%} of the {name}'s rms; {GIVE_RATE}."
             )
         out[name] = np.interp(grid, stamps, values)
         errors.append(f"{name} {relative:.2g}")
