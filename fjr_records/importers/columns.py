@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
 
@@ -15,6 +15,7 @@ from fjr_kit.errors import InputError
 
 from . import hdf5, json_log, mat, numpy_file, text
 from .source import Heading, Names, is_text, refuse_bomb, sample_axis
+from .split_stamps import joined, nanoseconds_beside
 
 Result = TypeVar("Result")
 
@@ -67,7 +68,8 @@ def read_columns(
 
     Returns:
         {name: float64 (samples,)}, and what the file says of each. Where most rows lack one of the
-        columns, as logs of several topics do, NaN stands for what a row does not hold.
+        columns, as logs of several topics do, NaN stands for what a row does not hold. A column of
+        whole seconds has the nanoseconds of the column beside it added.
 
     Raises:
         InputError: the file cannot be read, lacks a column (those that are there are named), or a
@@ -77,13 +79,21 @@ def read_columns(
 
     def columns(found: Names) -> tuple[dict[str, np.ndarray], dict[str, Heading]]:
         headings = {name: found.headings.get(name, Heading(name)) for name in names}
+        beside = {name: nanoseconds_beside(headings[name].title, found.known) for name in names}
+        asked = [*names, *(other for other in beside.values() if other is not None)]
         try:
-            return {name: _numbers(path, name, found.column(name)) for name in names}, headings
+            values = {name: _numbers(path, name, found.column(name)) for name in asked}
         except InputError:
-            parted = _parted_rows(found, names)
+            parted = _parted_rows(found, asked)
             if parted is None:
                 raise
-            return parted, headings
+            values = parted
+        for name, other in beside.items():
+            stamps = None if other is None else joined(values[name], values[other])
+            if stamps is not None and other is not None:
+                values[name] = stamps
+                headings[name] = replace(headings[name], unit="s", nanoseconds=other)
+        return {name: values[name] for name in names}, headings
 
     return _of_file(path, columns)
 

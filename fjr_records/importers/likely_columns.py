@@ -6,6 +6,7 @@ import re
 from collections.abc import Sequence
 
 from .import_map import UNITS
+from .split_stamps import is_seconds, nanoseconds_beside
 from .stated_units import stated_unit
 
 _TIME = {"t", "time", "timestamp", "stamp", "zeit"}
@@ -37,6 +38,10 @@ def likely_map(names: Sequence[str]) -> dict[str, str]:
         quantity = _quantity(name)
         if quantity is not None and not set(",:=") & set(name):
             found[quantity].append(name)
+    parts = {nanoseconds_beside(name, names) for name in names}
+    found["time"] = [name for name in found["time"] if name not in parts] or [
+        name for name in names if is_seconds(name)
+    ]
     return {
         quantity: f"{each[0]}{_factor(quantity, each[0])}"
         for quantity, each in found.items()

@@ -129,6 +129,11 @@ def read_samples(path: Path, options: ImportOptions) -> Samples:
         f"{quantity} is a 16-bit word that was read without its sign: 65535 is taken as -1"
         for quantity in unsigned
     )
+    notes += tuple(
+        f"{quantity} is {column.name} with the nanoseconds of {headings[column.name].nanoseconds}"
+        for quantity, column in columns.items()
+        if headings[column.name].nanoseconds
+    )
     values = {q: column.factor * arrays[column.name] for q, column in columns.items()}
     times = {q: values.pop(q) for q in columns if is_time(q)}
     stamps: dict[str, np.ndarray] = {}

@@ -80,7 +80,7 @@ def _even(time: np.ndarray, tick: float) -> Rounded | None:
         late, early = stamps - first * step, stamps - last * step
         return float(late.max() - early.min()), int(first[late.argmax()] - last[early.argmin()])
 
-    middle, reach = time[-1] / (time.size - 1), 2.0 * _LOOSE * tick / (time.size - 1)
+    middle, reach = float(time[-1]) / (time.size - 1), 2.0 * _LOOSE * tick / (time.size - 1)
     ends = max(middle - reach, 0.0), middle + reach
     best = _where(lambda step: width(step)[1] <= 0, *ends)
     narrowest = width(best)[0]

@@ -33,10 +33,12 @@ class Heading:
     Attributes:
         title: its name.
         unit: what stands of it in a row of units; empty if there is none.
+        nanoseconds: the column whose nanoseconds were added to it; empty if there is none.
     """
 
     title: str
     unit: str = ""
+    nanoseconds: str = ""
 
 
 @dataclass(frozen=True)

@@ -190,7 +190,8 @@ def _is_comment(line: str) -> bool:
 
 
 def _uncommented(line: str) -> str:
-    return line.strip(" \r\n").lstrip("#%/! ")
+    line = line.strip(" \r\n")
+    return line.lstrip("#%/! ") if _is_comment(line) else line
 
 
 def _start(grid: _Grid, text: str) -> tuple[int, Head]:
