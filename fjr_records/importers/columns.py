@@ -139,6 +139,8 @@ def held_columns(path: str | Path) -> tuple[list[Held], int]:
     """
 
     def held(found: Names) -> tuple[list[Held], int]:
+        if found.empty:
+            raise found.missing("column")
         return [_held(name, found) for name in found.known[:_MOST]], len(found.known[_MOST:])
 
     return _of_file(Path(path), held)
@@ -163,6 +165,11 @@ def _of_file(path: Path, use: Callable[[Names], Result]) -> Result:
     suffixes = [suffix.lower() for suffix in path.suffixes[-2:]]
     packed = suffixes[-1:] == [".gz"]
     suffix = suffixes[-2] if packed and len(suffixes) > 1 else path.suffix.lower()
+    if path.is_dir():
+        raise InputError(
+            f"{path}: is a folder; name the files in it, which hold the records (a bag needs no "
+            "import)."
+        )
     if not path.is_file():
         raise InputError(f"{path}: there is no such file.")
     if suffix == ROS_1:

@@ -90,7 +90,8 @@ class Column:
         if not name or not 1.0 / GREATEST_FACTOR <= abs(factor) <= GREATEST_FACTOR:
             raise InputError(
                 f"{quantity}={text} is not understood; write {quantity}=[-]column[:unit] with one "
-                f"of the units {', '.join(units)}, or with a factor to {next(iter(units))}."
+                f"of the units {', '.join(units)}, or with a factor to {next(iter(units))}"
+                f"{_by_number('colon' if unit else '')}."
             )
         return cls(name.strip(), sign * factor, not known, known if unit else "")
 
@@ -122,6 +123,11 @@ class Column:
         return f"{quantity} is taken in {self.unit}, though its column says {stated}"
 
 
+def _by_number(mark: str) -> str:
+    """Return how a column is named whose name holds a mark that parts the map; empty without."""
+    return mark and f"; give a column with a {mark} in its name by its number, counted from 0"
+
+
 def parse_map(
     specs: Sequence[str], *, described: bool = False, swings_free: bool = False
 ) -> dict[str, Column]:
@@ -147,7 +153,7 @@ def parse_map(
         if not equals or quantity not in UNITS or quantity in columns:
             raise InputError(
                 f"the map {spec!r} is not understood; give each of {', '.join(UNITS)} at most "
-                "once, as quantity=column."
+                f"once, as quantity=column{_by_number('' if equals else 'comma')}."
             )
         columns[quantity] = Column.parse(quantity, source)
     missing = [quantity for quantity in REQUIRED if quantity not in columns]

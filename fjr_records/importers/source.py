@@ -53,6 +53,7 @@ class Names:
         headings: of names that are not their own title, or of which more is said.
         find_with_holes: returns it with NaN where a row or entry does not hold it; None where
             `find` does.
+        empty: whether the file is empty.
     """
 
     path: Path
@@ -61,6 +62,7 @@ class Names:
     unlisted: Sequence[str] = ()
     headings: Mapping[str, Heading] = field(default_factory=dict)
     find_with_holes: Callable[[str], Any] | None = None
+    empty: bool = False
 
     def column(self, name: str, *, holes: bool = False) -> np.ndarray:
         """Return the array `name`, or the signal i of a matrix for `name[i]`; raise InputError.
@@ -85,7 +87,8 @@ class Names:
 
     def missing(self, name: str) -> InputError:
         """Return the error for a name that is not there."""
-        there = ", ".join(each[:_SHOWN] for each in self.known[:_SHOWN]) or "nothing"
+        nothing = "nothing, it is empty; record or copy it again" if self.empty else "nothing"
+        there = ", ".join(each[:_SHOWN] for each in self.known[:_SHOWN]) or nothing
         more = f" and {len(self.known) - _SHOWN} more" if len(self.known) > _SHOWN else ""
         return InputError(f"{self.path}: there is no {name}; the file holds {there}{more}.")
 

@@ -10,7 +10,7 @@ from .import_map import UNITS
 from .stated_units import stated_unit
 
 _ALL_UNITS = {unit: factor for units in UNITS.values() for unit, factor in units.items()}
-_LONGEST_UNIT = 40
+LONGEST_UNIT = 40
 """Characters of a cell that may state a unit."""
 _OPENING, _CLOSING = ("[", "(", "{", "<"), ("]", ")", "}", ">")
 
@@ -72,7 +72,7 @@ def unit_in(cell: str) -> str:
 
     It may be that of another quantity than a rig's: A, V, counts.
     """
-    if len(cell) > _LONGEST_UNIT:
+    if len(cell) > LONGEST_UNIT:
         return ""
     return _alone(cell) or (stated_unit(cell, "", _ALL_UNITS) if cell.endswith(_CLOSING) else "")
 
@@ -80,7 +80,7 @@ def unit_in(cell: str) -> str:
 def _alone(cell: str) -> str:
     """Return the unit that a cell is, perhaps in brackets; empty if it is none that is known."""
     short = cell[1:-1] if cell.startswith(_OPENING) and cell.endswith(_CLOSING) else cell
-    return stated_unit(f"- ({short})", "", _ALL_UNITS) if len(short) <= _LONGEST_UNIT else ""
+    return stated_unit(f"- ({short})", "", _ALL_UNITS) if len(short) <= LONGEST_UNIT else ""
 
 
 def _different(row: list[str], is_number: Callable[[str], bool]) -> tuple[int, int]:

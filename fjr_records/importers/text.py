@@ -16,9 +16,9 @@ import numpy as np
 
 from fjr_kit.errors import InputError, shown
 
-from .clock_stamps import is_stamp, rejoined, since
+from .clock_stamps import STAMPS_READ, has_clock, is_stamp, rejoined, since
 from .source import Heading, Names, read_text
-from .table_head import Head, head_of
+from .table_head import LONGEST_UNIT, Head, head_of, unit_in
 
 _DELIMITERS = ("\t", ";", ",", "|", None)
 """None stands for white space."""
@@ -36,6 +36,7 @@ _NOWHERE = 2**62
 _NUMBER = re.compile(
     r"[+-]?(\d+(\.\d*)?|\.\d+)([ed][+-]?\d+)?|[+-]?(nan|inf(inity)?)", re.I | re.ASCII
 )
+_WITH_UNIT = re.compile(r"(?P<number>[-+\d.,eE]*\d[.,]?)\s*(?P<unit>[^\d\s.,+-].*)", re.ASCII)
 
 
 @dataclass(frozen=True)
@@ -70,9 +71,20 @@ class _Layout:
         plain = self.plain(cell)
         return float(plain.replace("D", "E").replace("d", "e") if "d" in plain.lower() else plain)
 
+    def has_unit(self, cell: str) -> bool:
+        """Tell whether a cell holds a number with a unit behind it."""
+        short = len(cell) <= 2 * LONGEST_UNIT
+        parts = _WITH_UNIT.fullmatch(cell) if short else None
+        return (
+            parts is not None and self.is_number(parts["number"]) and bool(unit_in(parts["unit"]))
+        )
+
     def holds(self, cell: str) -> bool:
-        """Tell whether a cell holds a number, or a stamp of calendar and clock."""
-        return self.is_number(cell) or is_stamp(cell)
+        """Tell whether a cell holds a number, or a stamp of calendar and clock.
+
+        A unit behind a number is no obstacle here: it is refused when the column is read.
+        """
+        return self.is_number(cell) or is_stamp(cell) or self.has_unit(cell)
 
 
 @dataclass(frozen=True)
@@ -121,14 +133,15 @@ class _Grid:
         return sum(found), headed, len(self.numbers), share, parted, named, rank
 
 
-_LAYOUTS = tuple(
-    _Layout(d, comma) for comma in (False, True) for d in _DELIMITERS if not (comma and d == ",")
-)
+_LAYOUTS = tuple(_Layout(d, comma) for comma in (False, True) for d in _DELIMITERS)
+"""The likeliest first. Of numbers with a decimal comma a comma parts those in quotes alone."""
 
 
 def open_text(path: Path) -> Names:
     """Open a table; columns without names are called 0, 1, ...; raise InputError."""
     text = read_text(path)
+    if "\n" not in text:
+        text = text.replace("\r", "\n")  # ends of lines as on old Macs
     first = [line for _, line in _lines(text, _LOOKED_AT)]
     if max((_columns_at_most(line) for line in first), default=0) > _MOST_COLUMNS:
         raise InputError(
@@ -163,7 +176,8 @@ def open_text(path: Path) -> Names:
         return _column(path, layout, text, start, index, columns, name, origin=origin, holes=holes)
 
     unlisted = [*numbers, *twice, *head.others]
-    return Names(path, listed, find, unlisted, headings, partial(find, holes=True))
+    with_holes = partial(find, holes=True)
+    return Names(path, listed, find, unlisted, headings, with_holes, empty=not text.strip())
 
 
 def _columns_at_most(line: str) -> int:
@@ -270,9 +284,13 @@ def _column(
             begun = True
             values.append(read(cell))
         except ValueError:
+            mend = "repair or cut it"
+            if layout.has_unit(cell):
+                mend = "write the unit in the name of the column, not in each cell"
+            elif has_clock(cell):
+                mend = STAMPS_READ
             raise InputError(
-                f"{path}: line {number}: {shown(cell)} in column {name} is not a {kind}; repair "
-                "or cut it."
+                f"{path}: line {number}: {shown(cell)} in column {name} is not a {kind}; {mend}."
             ) from None
     if not values:
         raise InputError(f"{path}: holds no numbers below the line of names.")

@@ -50,6 +50,12 @@ TEXTS = {
     "blank_lines.csv": ("\n\nt,r,y\n\n" + table(",").replace("\n", "\n\n"), "ry"),
     "fortran.txt": (table(" ").replace("e-", "D-"), "12"),
     "unknown_suffix.lvm": ("X t\n***End***\nt\tr\ty\tComment\n" + table("\t", after="\t"), "ry"),
+    "quoted_decimal_comma.csv": (
+        "t,r,y\n" + '"' + table('";"', comma=True, end='"\n"').replace('";"', '","')[:-1],
+        "ry",
+    ),
+    "old_mac.csv": ("t,r,y\r" + table(",", end="\r"), "ry"),
+    "slashes.csv": ("/t,/r,/y\n" + table(","), ("/r", "/y")),
     "packed.txt.gz": ("Time, Goal Angle, y\n" + table(", "), ("Goal Angle", "y")),
 }
 
@@ -118,6 +124,12 @@ STAMPS = {
     "dots": ("31.01.2026 23:59:59,75", "1.2.2026 0:00:00,25"),
     "slashes": ("2026/1/31_23:59:59.75", "2026/2/1_00:00:00.25"),
     "clock": ("9:59:59.75", "10:00:00.25"),
+    "month first": ("12/31/2026 23:59:59.750", "01/01/2027 00:00:00.250"),
+    "day first": ("31/12/2026 23:59:59.750", "01/01/2027 00:00:00.250"),
+    "one day": ("03/12/2026 23:59:58.750", "03/12/2026 23:59:59.250"),
+    "afternoon": ("03/12/2026 11:59:59.75 AM", "03/12/2026 12:00:00.25 PM"),
+    "midnight": ("3/12/2026 11:59:59.75 pm", "3/13/2026 12:00:00.25 am"),
+    "afternoon without a day": ("12:59:59.75 PM", "1:00:00.25 PM"),
 }
 
 
@@ -302,6 +314,10 @@ BROKEN = [
     ("a.csv", "r,y\n12:00:00,1\noops,2\n", "line 3: 'oops' in column r is not a stamp of cal"),
     ("a.csv", "r,y\n12:00:00,1\n12:00:01,on\n", "line 3: 'on' in column y is not a number"),
     ("a.csv", "r,y\n2026-02-30 1:00:00,1\n", "line 2: '2026-02-30 1:00:00' in column r is not a"),
+    ("a.csv", "r,y\n3/11/2026 23:59:59,1\n3/12/2026 0:00:00,1\n", "if a number above 12 tells da"),
+    ("a.csv", "r,y\n31 Jan 2026 1:00:00,1\n", "write it as 2026-01-31 12:00:00.125, 31.01.2026 12"),
+    ("a.csv", "r,y\n0.1 rad,0.2rad\n0.2 rad,0.3rad\n", "line 2: '0.1 rad' in column r is not a num"
+     "ber; write the unit in the name of the column, not in each cell"),
     ("a.gz", "", "cannot tell the format"),
 ]  # fmt: skip
 
@@ -314,6 +330,22 @@ def test_broken_files_are_refused_in_a_sentence(tmp_path, name, content, says):
     sentence = str(refused.value)
     assert sentence.startswith(f"{tmp_path / name}: ") and "\n" not in sentence
     assert sentence.endswith(".") and len(sentence) < 400
+
+
+def test_a_folder_is_no_file(tmp_path):
+    for read in (held_columns, lambda path: read_columns(path, ["r"])):
+        with pytest.raises(InputError, match=r"is a folder; name the files in it, which hold the"):
+            read(tmp_path)
+
+
+@pytest.mark.parametrize("name", ["a.csv", "a.txt", "a.csv.gz"])
+def test_an_empty_file_is_said_to_be_empty(tmp_path, name):
+    (tmp_path / name).write_bytes(gzip.compress(b"") if name.endswith("gz") else b"")
+    for read in (held_columns, lambda path: read_columns(path, ["r"])):
+        with pytest.raises(
+            InputError, match=r"the file holds nothing, it is empty; record or copy it"
+        ):
+            read(tmp_path / name)
 
 
 def test_a_packed_file_that_stands_for_gigabytes_is_refused(tmp_path):

@@ -270,6 +270,14 @@ def test_harmonics_text():
         (("torque=u", "velocity=v:rpm"), "a speed stands for an angle, as in position=v:rpm"),
         ((*SI_MAP, "q"), "'q' is not understood"),
         (
+            (*SI_MAP[:2], "position=y", " left"),
+            "with a comma in its name by its number, counted from",
+        ),
+        (
+            (*SI_MAP[:2], "position=y: left"),
+            "with a colon in its name by its number, counted from 0",
+        ),
+        (
             ("reference=r", "torque=u", "position=y:grad"),
             "one of the units rad, mrad, .*, or with a f",
         ),
