@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 from .import_map import UNITS
 from .stated_units import stated_unit
@@ -12,6 +13,8 @@ from .stated_units import stated_unit
 _ALL_UNITS = {unit: factor for units in UNITS.values() for unit, factor in units.items()}
 LONGEST_UNIT = 40
 """Characters of a cell that may state a unit."""
+MOST_COLUMNS = 1000
+"""Columns of a table in whose cells units are sought."""
 _OPENING, _CLOSING = ("[", "(", "{", "<"), ("]", ")", "}", ">")
 
 
@@ -54,14 +57,15 @@ def head_of(
     units = [""] * len(names)
     for at, row in sorted(enumerate(rest), key=lambda one: _is_of_units(one[1])):
         below = at >= place and _is_of_units(row)  # there also what is no unit that is known
-        found = [unit_in(cell) or cell * below for cell in row]
-        units[: len(row)] = [new or old for new, old in zip(found, units, strict=False)]
+        found = [unit_in(cell) or cell * below for cell in row[:MOST_COLUMNS]]
+        units[: len(found)] = [new or old for new, old in zip(found, units, strict=False)]
     times = Counter(cell for row in rest for cell in row)
+    taken = {"", *names}
     others = {
         cell: at
         for row in rest
         for at, cell in enumerate(row[: len(names)])
-        if times[cell] == 1 and cell and cell not in names and not is_number(cell)
+        if times[cell] == 1 and cell not in taken and not is_number(cell)
     }
     called = [str(at) if is_number(cell) else cell or str(at) for at, cell in enumerate(names)]
     return Head(called, units, others)
@@ -77,6 +81,7 @@ def unit_in(cell: str) -> str:
     return _alone(cell) or (stated_unit(cell, "", _ALL_UNITS) if cell.endswith(_CLOSING) else "")
 
 
+@lru_cache(maxsize=2**16)
 def _alone(cell: str) -> str:
     """Return the unit that a cell is, perhaps in brackets; empty if it is none that is known."""
     short = cell[1:-1] if cell.startswith(_OPENING) and cell.endswith(_CLOSING) else cell
@@ -91,7 +96,7 @@ def _different(row: list[str], is_number: Callable[[str], bool]) -> tuple[int, i
 
 def _is_of_units(row: list[str]) -> bool:
     """Tell whether at least half of the cells of a line that hold anything are units."""
-    filled = [cell for cell in row if cell]
+    filled = [cell for cell in row[:MOST_COLUMNS] if cell]
     return 0 < len(filled) <= 2 * sum(bool(_alone(cell)) for cell in filled)
 
 

@@ -36,7 +36,7 @@ _NOWHERE = 2**62
 _NUMBER = re.compile(
     r"[+-]?(\d+(\.\d*)?|\.\d+)([ed][+-]?\d+)?|[+-]?(nan|inf(inity)?)", re.I | re.ASCII
 )
-_WITH_UNIT = re.compile(r"(?P<number>[-+\d.,eE]*\d[.,]?)\s*(?P<unit>[^\d\s.,+-].*)", re.ASCII)
+_WITH_UNIT = re.compile(r"(?P<number>[-+\d.,eE]*\d[.,]?)\s*(?P<unit>[^\d\s.,+-]\D*)", re.ASCII)
 
 
 @dataclass(frozen=True)

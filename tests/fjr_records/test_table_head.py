@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from itertools import permutations
 
 import numpy as np
@@ -137,3 +138,16 @@ def test_prose_above_names_nothing(tmp_path):
     )
     (tmp_path / "a.txt").write_text(head + rows(T, POS, TRQ, delimiter=" "))
     assert open_text(tmp_path / "a.txt").known == ["t", "pos", "trq"]
+
+
+WIDE = [",".join(f"{k:x}{line}x" for k in range(3000)) for line in range(40)]
+
+
+@pytest.mark.parametrize("head", [WIDE, [",".join(["a"] * 3000)] * 40, [",".join(["1 A"] * 3000)]])
+def test_a_megabyte_of_lines_above_a_table_is_read_in_seconds(tmp_path, head):
+    table = [",".join(["1"] * 3000)] * ((1_000_000 - sum(map(len, head))) // 6000)
+    (tmp_path / "a.csv").write_text("\n".join([*head, *table]))
+    begin = time.process_time()
+    opened = open_text(tmp_path / "a.csv")
+    assert len(opened.known) == 3000
+    assert time.process_time() - begin < 10.0
