@@ -15,6 +15,8 @@ LONGEST_UNIT = 40
 """Characters of a cell that may state a unit."""
 MOST_COLUMNS = 1000
 """Columns of a table in whose cells units are sought."""
+_LABELS = ("unit", "einheit")
+"""What a cell holds that only says that its line is one of units."""
 _OPENING, _CLOSING = ("[", "(", "{", "<"), ("]", ")", "}", ">")
 
 
@@ -57,7 +59,7 @@ def head_of(
     units = [""] * len(names)
     for at, row in sorted(enumerate(rest), key=lambda one: _is_of_units(one[1])):
         below = at >= place and _is_of_units(row)  # there also what is no unit that is known
-        found = [unit_in(cell) or cell * below for cell in row[:MOST_COLUMNS]]
+        found = [unit_in(cell) or _unlabelled(cell) * below for cell in row[:MOST_COLUMNS]]
         units[: len(found)] = [new or old for new, old in zip(found, units, strict=False)]
     times = Counter(cell for row in rest for cell in row)
     taken = {"", *names}
@@ -79,6 +81,11 @@ def unit_in(cell: str) -> str:
     if len(cell) > LONGEST_UNIT:
         return ""
     return _alone(cell) or (stated_unit(cell, "", _ALL_UNITS) if cell.endswith(_CLOSING) else "")
+
+
+def _unlabelled(cell: str) -> str:
+    """Return a cell of a line of units; empty if it only says that this is one."""
+    return "" if any(label in cell.lower() for label in _LABELS) else cell
 
 
 @lru_cache(maxsize=2**16)

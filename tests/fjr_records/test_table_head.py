@@ -124,6 +124,14 @@ def test_labels_of_lines_are_no_units(tmp_path):
     assert [opened.headings[name].unit for name in opened.known] == ["", "deg", "N m"]
 
 
+@pytest.mark.parametrize("label", ["Unit", "Units", "Einheit"])
+def test_the_label_of_a_line_of_units_is_none(tmp_path, label):
+    head = TWINCAT + f"SampleTime[ms]\t1\tSampleTime[ms]\t1\n{label}\tdeg\t{label}\tN m\n"
+    (tmp_path / "a.csv").write_text(head + rows(T, POS, T, TRQ, delimiter="\t"))
+    opened = open_text(tmp_path / "a.csv")
+    assert [opened.headings[name].unit for name in opened.known] == ["ms", "deg", "ms", "N m"]
+
+
 def test_what_a_line_of_units_says_below_the_names_is_taken_for_one_though_nobody_knows_it(
     tmp_path,
 ):
