@@ -69,7 +69,7 @@ class Names:
         if name in self.known or name in self.unlisted:
             return np.asarray(find(name))
         match = _INDEXED.fullmatch(name)
-        if match is None or match["name"] not in self.known:
+        if match is None or match["name"] not in {*self.known, *self.unlisted}:
             raise self.missing(name if match is None else match["name"] or name)
         matrix, index = np.asarray(find(match["name"])), int(match["index"])
         axis = sample_axis(matrix.shape)
@@ -80,6 +80,12 @@ class Names:
                 "from 0."
             )
         return matrix[:, index] if axis == 0 else matrix[index]
+
+    def heading(self, name: str) -> Heading:
+        """Return what the file says of a column, for `name[i]` what it says of the matrix."""
+        match = None if name in self.headings else _INDEXED.fullmatch(name)
+        whole = Heading(name) if match is None else self.headings.get(match["name"], Heading(name))
+        return self.headings.get(name, whole)
 
     def missing(self, name: str) -> InputError:
         """Return the error for a name that is not there."""

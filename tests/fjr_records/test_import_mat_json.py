@@ -1,0 +1,174 @@
+"""MAT, HDF5 and JSON files as recorders write them: versions, structures, cells, stamps, rows."""
+
+from __future__ import annotations
+
+import math
+import struct
+
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+from fjr_cli.import_summary import held_by
+from fjr_kit.errors import InputError
+from fjr_records.importers.columns import held_columns, read_columns
+from fjr_records.importers.import_map import Column
+
+T = np.arange(40) / 100.0
+R, Y = np.sin(7 * T), 0.5 * np.sin(7 * T - 0.3)
+
+
+def names_in(path) -> list[str]:
+    return [one.name for one in held_columns(path)[0]]
+
+
+def test_mat_of_version_4(tmp_path):
+    savemat(tmp_path / "a.mat", {"t": T, "y": Y[:, None], "m": np.array([R, Y])}, format="4")
+    found = read_columns(tmp_path / "a.mat", ["t", "y", "m[0]"])[0]
+    np.testing.assert_array_equal(list(found.values()), [T, Y, R])
+    big = np.random.default_rng(0).normal(size=10**6)
+    savemat(tmp_path / "big.mat", {"t": big}, format="4")
+    np.testing.assert_array_equal(read_columns(tmp_path / "big.mat", ["t"])[0]["t"], big)
+
+
+@pytest.mark.parametrize("kind", [0, 50, 2])
+@pytest.mark.parametrize("rows", [2**31 - 1, -5, 10**6])
+def test_mat_of_version_4_that_lies_about_its_size_is_refused(tmp_path, kind, rows):
+    head = struct.pack("<5i", kind, rows, 900, 1, 2)
+    (tmp_path / "a.mat").write_bytes(head + b"y\0" + bytes(800))
+    with pytest.raises(InputError, match=r"a\.mat: is not a readable MAT file"):
+        read_columns(tmp_path / "a.mat", ["y"])
+
+
+def dspace(names, units) -> dict:
+    """Return a recording as dSPACE ControlDesk exports it."""
+    kinds = [(field, object) for field in ("Name", "Data", "Unit", "XIndex")]
+    signals = np.zeros(len(names), kinds)
+    signals["Name"], signals["Unit"], signals["XIndex"] = names, units, 1.0
+    for at, values in enumerate([R, Y, T][: len(names)]):
+        signals["Data"][at] = values
+    time = {"Name": "", "Data": 1e3 * T, "Unit": "ms"}
+    return {"exp_001": {"X": time, "Y": signals, "Description": "Bench", "Capture": {"Delay": 0}}}
+
+
+def as_7_3(path, content) -> None:
+    """Write variables as MATLAB does with `-v7.3`: texts as words, elements behind references."""
+    h5py = pytest.importorskip("h5py", reason="h5py, of the extra hdf5, is not installed")
+    with h5py.File(path, "w", userblock_size=512) as file:
+
+        def behind(value):
+            put(place := f"#refs#/{len(file.require_group('#refs#'))}", value)
+            return file[place].ref
+
+        def references(place, values):
+            cells = np.array([[behind(value)] for value in values], h5py.ref_dtype)
+            return file.create_dataset(place, data=cells)
+
+        def put(place, value):
+            if isinstance(value, dict):
+                file.require_group(place).attrs["MATLAB_class"] = np.bytes_("struct")
+                for field, inner in value.items():
+                    put(f"{place}/{field}", inner)
+            elif isinstance(value, str):
+                words = np.frombuffer(value.encode("utf-16-le"), np.uint16)[:, None]
+                file[place] = words if value else np.zeros(2, np.uint64)
+                file[place].attrs["MATLAB_class"] = np.bytes_("char")
+                if not value:
+                    file[place].attrs["MATLAB_empty"] = np.uint8(1)
+            elif isinstance(value, list):
+                references(place, value).attrs["MATLAB_class"] = np.bytes_("cell")
+            elif isinstance(value, np.ndarray) and value.dtype.names:
+                file.require_group(place).attrs["MATLAB_class"] = np.bytes_("struct")
+                for field in value.dtype.names:
+                    references(f"{place}/{field}", value[field])
+            else:
+                file[place] = np.atleast_2d(value).T
+                file[place].attrs["MATLAB_class"] = np.bytes_("double")
+
+        for name, value in content.items():
+            put(name, value)
+    with path.open("r+b") as file:
+        file.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64")
+
+
+WRITERS = {"5": savemat, "7.3": as_7_3}
+
+
+@pytest.mark.parametrize("version", WRITERS)
+def test_channels_of_dspace_have_their_names_and_units(tmp_path, version):
+    names = ["motor angle", "Platform()://Model Root/iq", "Model Root/t"]
+    WRITERS[version](tmp_path / "a.mat", dspace(names, ["deg", "A", ""]))
+    listed = ["exp_001.X.Data", "motor angle", "exp_001.Y[1].Data", "Model Root/t"]
+    assert sorted(names_in(tmp_path / "a.mat")) == sorted(listed)
+    assert ", called 'Platform()://Model Root/iq'" in "\n".join(held_by(tmp_path / "a.mat"))
+    asked = [*names, "exp_001.Y[0].Data", "exp_001.X.Data"]
+    found, headings = read_columns(tmp_path / "a.mat", asked)
+    np.testing.assert_array_equal(list(found.values()), [R, Y, T, R, 1e3 * T])
+    for text, factor in ((names[0], math.pi / 180.0), (asked[3], math.pi / 180.0), (names[2], 1.0)):
+        column = Column.parse("position", text)
+        read = column.read_as(tmp_path / "a.mat", "position", headings[text])
+        assert read.factor == factor and read.stated == (factor != 1.0)
+    time = Column.parse("time", asked[4]).read_as(tmp_path / "a.mat", "time", headings[asked[4]])
+    assert time.unit == "ms"
+    current = Column("exp_001.Y[1].Data")
+    with pytest.raises(InputError, match=r"a\.mat: torque is mapped to Plat.* says to be in A; gi"):
+        current.read_as(tmp_path / "a.mat", "torque", headings[names[1]])
+
+
+@pytest.mark.parametrize("version", WRITERS)
+def test_channels_of_one_name_keep_their_places(tmp_path, version):
+    WRITERS[version](tmp_path / "a.mat", dspace(["Out1", "Out1"], ["", ""]))
+    listed = ["exp_001.X.Data", "exp_001.Y[0].Data", "exp_001.Y[1].Data"]
+    assert sorted(names_in(tmp_path / "a.mat")) == listed
+    with pytest.raises(InputError, match="there is no Out1; the file holds exp_001"):
+        read_columns(tmp_path / "a.mat", ["Out1"])
+
+
+@pytest.mark.parametrize("version", WRITERS)
+def test_a_timeseries_as_a_structure_states_the_unit_of_its_data_alone(tmp_path, version):
+    series = {"Name": "q", "Time": T, "Data": np.array([R, Y]), "Units": "deg"}
+    WRITERS[version](tmp_path / "a.mat", {"ts": series, "enc": {"unit": "rev", "x": R}})
+    found, headings = read_columns(tmp_path / "a.mat", ["ts.Time", "ts.Data[1]", "q[0]", "enc.x"])
+    np.testing.assert_array_equal(list(found.values()), [T, Y, R, R])
+    assert [each.unit for each in headings.values()] == ["", "deg", "deg", "rev"]
+
+
+@pytest.mark.parametrize("version", WRITERS)
+def test_cells_of_vectors_are_columns(tmp_path, version):
+    cells, uneven = np.zeros((2, 2), object)
+    cells[:], uneven[:] = [R, Y], [R, Y[:9]]
+    if version == "7.3":
+        cells, uneven = list(cells), list(uneven)
+    nested = {"log": {"c": cells}, "u": uneven, "words": ["a", "bc"]}
+    WRITERS[version](tmp_path / "a.mat", nested)
+    assert sorted(names_in(tmp_path / "a.mat")) == ["log.c[0]", "log.c[1]", "u[0]", "u[1]"]
+    found = read_columns(tmp_path / "a.mat", ["log.c[1]", "u[1]"])[0]
+    np.testing.assert_array_equal(found["log.c[1]"], Y)
+    np.testing.assert_array_equal(found["u[1]"], Y[:9])
+
+
+def test_hdf5_states_units_in_attributes_and_what_is_empty_is_no_obstacle(tmp_path):
+    h5py = pytest.importorskip("h5py", reason="h5py, of the extra hdf5, is not installed")
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["run/q"], file["run/none"] = np.array([R, Y]), h5py.Empty(float)
+        file["run/q"].attrs["units"] = "deg"
+        file["enc/data"], file["enc/unit"] = R, "mrad"
+    found, headings = read_columns(tmp_path / "a.h5", ["run.q[1]", "enc.data"])
+    np.testing.assert_array_equal(list(found.values()), [Y, R])
+    assert [each.unit for each in headings.values()] == ["deg", "mrad"]
+    assert sorted(names_in(tmp_path / "a.h5")) == ["enc.data", "run.q"]
+
+
+def test_references_that_lead_in_circles_end(tmp_path):
+    h5py = pytest.importorskip("h5py", reason="h5py, of the extra hdf5, is not installed")
+    with h5py.File(tmp_path / "a.mat", "w", userblock_size=512) as file:
+        for k in range(30):
+            group = file.create_group(f"g{k}")
+            group["x"] = R
+            group.create_dataset("c", (30, 1), h5py.ref_dtype)
+        for k in range(30):
+            file[f"g{k}/c"][:] = np.array([[file[f"g{at}"].ref] for at in range(30)], object)
+            file[f"g{k}/c"].attrs["MATLAB_class"] = np.bytes_("cell")
+    with (tmp_path / "a.mat").open("r+b") as file:
+        file.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64")
+    assert "g3.x" in names_in(tmp_path / "a.mat") and len(names_in(tmp_path / "a.mat")) == 60
