@@ -17,7 +17,7 @@ from .structures import names_of
 _SMALL = 2**13
 """Most bytes of a text, or of references: of 8 bytes for each element of a cell array."""
 _EMPTY = "MATLAB_empty"
-_DEEP, _MOST = 20, 30_000
+_DEEP, _MOST = 20, 10_000
 """References after references that are followed, and how much is looked at behind all of them."""
 
 

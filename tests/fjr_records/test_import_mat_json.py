@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import struct
 
@@ -172,3 +173,94 @@ def test_references_that_lead_in_circles_end(tmp_path):
     with (tmp_path / "a.mat").open("r+b") as file:
         file.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64")
     assert "g3.x" in names_in(tmp_path / "a.mat") and len(names_in(tmp_path / "a.mat")) == 60
+
+
+ISO = "2023-11-14T22:13:{}"
+QUOTED = [{"t": ISO.format("20.001"), "y": 1}, {"t": ISO.format("20.251"), "y": 2}]
+CLOCKS = {
+    "entries": json.dumps(QUOTED),
+    "lists": json.dumps({"t": [ISO.format("59.875Z"), ISO.format("60.125Z")], "y": [1, 2]}),
+    "lines": '{"t": "23:59:58.5", "y": "1"}\n{"t": "23:59:58.75", "y": "2"}\n',
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", CLOCKS)
+def test_json_with_stamps_of_calendar_and_clock_and_numbers_in_quotes(tmp_path, kind):
+    (tmp_path / "a.json").write_text(CLOCKS[kind])
+    found, headings = read_columns(tmp_path / "a.json", ["t", "y"])
+    np.testing.assert_allclose(found["t"], [0.0, 0.25], atol=1e-9)
+    assert found["y"].tolist() == [1.0, 2.0]
+    assert headings["t"].unit == "s" and headings["y"].unit == ""
+    assert names_in(tmp_path / "a.json") == ["t", "y"]
+
+
+def test_json_stamps_of_two_columns_count_from_one_origin(tmp_path):
+    rows = [{"a": ISO.format("20.0"), "b": ISO.format("20.5")}] * 2
+    (tmp_path / "a.json").write_text(json.dumps(rows))
+    found = read_columns(tmp_path / "a.json", ["b", "a"])[0]
+    np.testing.assert_allclose(found["b"] - found["a"], 0.5, atol=1e-9)
+
+
+@pytest.mark.parametrize(("sec", "ns"), [("sec", "nanosec"), ("sec", "nsec"), ("secs", "nsecs")])
+def test_json_with_stamps_of_ros(tmp_path, sec, ns):
+    stamps = [(1_700_000_000, 999_999_999), (1_700_000_001, 1_000_999)]
+    rows = [
+        {"header": {"stamp": {sec: s, ns: n}, "frame_id": ""}, "effort": [float(n)]}
+        for s, n in stamps
+    ]
+    (tmp_path / "a.jsonl").write_text("\n".join(map(json.dumps, rows)))
+    assert names_in(tmp_path / "a.jsonl") == ["header.stamp", "effort"]
+    names = ["header.stamp", f"header.stamp.{ns}"]
+    found, headings = read_columns(tmp_path / "a.jsonl", names)
+    assert np.diff(found[names[0]]) == pytest.approx(0.001001, rel=1e-9)
+    assert found[names[1]].tolist() == [999_999_999.0, 1_000_999.0]
+    assert [headings[name].unit for name in names] == ["s", ""]
+
+
+@pytest.mark.parametrize("rows", [["0", "1", "2"], ["0.0", "0.5", "1.0"], ["7", "3", "5"]])
+def test_json_as_pandas_writes_it(tmp_path, rows):
+    columns = {"r": dict(zip(rows, R[:3], strict=True)), "y": dict(zip(rows, Y[:3], strict=True))}
+    (tmp_path / "a.json").write_text(json.dumps(columns))
+    found = read_columns(tmp_path / "a.json", ["r", "y"])[0]
+    np.testing.assert_array_equal(list(found.values()), [R[:3], Y[:3]])
+    if rows[0] == "0":
+        assert names_in(tmp_path / "a.json") == ["r", "y"]
+    else:
+        index = read_columns(tmp_path / "a.json", ["index"])[0]["index"]
+        assert index.tolist() == [float(row) for row in rows]
+
+
+def test_json_lines_of_several_topics_whose_values_are_lists(tmp_path):
+    rows = []
+    for k in range(40):
+        rows.append({"t": T[k], "position": [R[k], Y[k]], "effort": [] if k % 2 else [Y[k], R[k]]})
+        rows += [{"t": T[k] + 0.001, "cmd": 0.5}, {"t": T[k] + 0.002, "mode": "idle"}]
+    (tmp_path / "a.jsonl").write_text("\n".join(map(json.dumps, rows)))
+    found = read_columns(tmp_path / "a.jsonl", ["t", "position[1]", "effort[0]", "cmd"])[0]
+    assert all(each.size == 120 for each in found.values())
+    np.testing.assert_array_equal(found["position[1]"][::3], Y)
+    np.testing.assert_array_equal(found["effort[0]"][::6], Y[::2])
+    assert np.isnan(found["position[1]"]).sum() == 80 and np.isnan(found["effort[0]"]).sum() == 100
+
+
+JSON_BROKEN = [
+    ('[{"t": "22:13:20"}, {"t": 5}]', "t is 5 in entry 1, not a stamp of calendar and clock; repa"),
+    ('[{"t": "22:13:20"}, {"t": "x"}]', "t is 'x' in entry 1, not a stamp of calendar and clock"),
+    ('[{"t": "1.5"}, {"t": "x"}]', "t is 'x' in entry 1, not a number; repair or cut the record"),
+    ('[{"t": {"sec": 1, "nanosec": 2}}, {"t": 3}]', "t is 3 in entry 1, not a stamp of sec and"),
+    ('[{"t": 1}, {"t": {"sec": 1, "nanosec": 2}}]', "in entry 1, not a number; repair or cut"),
+    ('[{"t": 1' + "0" * 400 + '}, {"t": 2}]', "t does not hold real numbers; choose another"),
+    ('[{"t": [1, "x"]}, {"t": [1, 2]}]', "t does not hold real numbers; choose another column"),
+    ("[" + '{"t": [' + "1," * 9000 + "1]}" + ',{"s": 1}' * 9000 + "]", "entry 1 has no t"),
+    ('{"t": ["' + "x" * 200_000 + '"' + ', "a"' * 200_000 + "]}", "not a number; repair or cut"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "says"), JSON_BROKEN)
+def test_json_that_is_broken_is_refused_in_a_sentence(tmp_path, text, says):
+    (tmp_path / "a.json").write_text(text)
+    with pytest.raises(InputError, match=says) as refused:
+        read_columns(tmp_path / "a.json", ["t"])
+    assert (
+        str(refused.value).startswith(f"{tmp_path / 'a.json'}: ") and len(str(refused.value)) < 400
+    )
