@@ -158,6 +158,11 @@ def _of_file(path: Path, use: Callable[[Names], Result]) -> Result:
     suffixes = [suffix.lower() for suffix in path.suffixes[-2:]]
     packed = suffixes[-1:] == [".gz"]
     suffix = suffixes[-2] if packed and len(suffixes) > 1 else path.suffix.lower()
+    if path.is_dir():
+        raise InputError(
+            f"{path}: is a folder, not a file; name the files in it, as in FOLDER/*.csv; a bag of "
+            "ROS 2 needs no import."
+        )
     if not path.is_file():
         raise InputError(f"{path}: there is no such file.")
     if suffix == ROS_1:

@@ -11,7 +11,7 @@ import numpy as np
 
 from fjr_kit.errors import InputError
 
-from .source import Names, refuse_bomb
+from .source import Names, refuse_bomb, unreadable
 from .structures import names_of
 
 _SMALL = 2**13
@@ -141,4 +141,4 @@ def _word(values: np.ndarray) -> str:
 
 
 def _unreadable(path: Path, kind: str) -> InputError:
-    return InputError(f"{path}: is not a readable {kind} file; save it again.")
+    return unreadable(path, f"a readable {kind} file", "save it again")

@@ -62,6 +62,10 @@ def _parse(path: Path, text: str) -> Any:
     except ValueError as error:
         lines = (found.group() for found in re.finditer(r"\S[^\n]*", text))
         first = next(lines, "")
+        if not first:
+            raise InputError(
+                f"{path}: is not JSON: the file is empty; copy or record it again."
+            ) from None
         if first[:1] not in ("{", "[") or next(lines, None) is None:
             raise InputError(f"{path}: is not JSON ({_what(error)}).") from None
     lines = (found.group() for found in re.finditer(r"\S[^\n]*", text))

@@ -10,10 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from fjr_kit.errors import InputError
-
 from .hdf5 import open_hdf5
-from .source import EXPANSION, LEAST_BYTES, Names, refuse_bomb
+from .source import EXPANSION, LEAST_BYTES, Names, refuse_bomb, unreadable
 from .structures import names_of
 
 _HEADER, _COMPRESSED = 128, 15
@@ -42,7 +40,7 @@ def open_mat(path: Path) -> Names:
             warnings.simplefilter("ignore")  # about MATLAB objects, which are not read
             content = loadmat(path, simplify_cells=True)
     except Exception:  # scipy parses arbitrary bytes here: anything may go wrong
-        raise InputError(f"{path}: is not a readable MAT file; save it again.") from None
+        raise unreadable(path, "a readable MAT file", "save it again") from None
     arrays: dict[str, np.ndarray] = {}
     texts: dict[str, str] = {}
     for key, value in content.items():

@@ -108,6 +108,19 @@ def refuse_bomb(path: Path, size: int, least: int = LEAST_BYTES) -> None:
         )
 
 
+def unreadable(path: Path, what: str, mend: str) -> InputError:
+    """Return the error for a file that is not what its name says.
+
+    Args:
+        path: the file.
+        what: what it should be.
+        mend: what to do, unless it is empty.
+    """
+    if not path.stat().st_size:
+        return InputError(f"{path}: is not {what}: the file is empty; copy or record it again.")
+    return InputError(f"{path}: is not {what}; {mend}.")
+
+
 def is_text(path: Path) -> bool:
     """Tell whether a file begins as text of several lines, without bytes that no text holds."""
     with path.open("rb") as file:

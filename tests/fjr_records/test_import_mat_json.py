@@ -264,3 +264,18 @@ def test_json_that_is_broken_is_refused_in_a_sentence(tmp_path, text, says):
     assert (
         str(refused.value).startswith(f"{tmp_path / 'a.json'}: ") and len(str(refused.value)) < 400
     )
+
+
+@pytest.mark.parametrize("suffix", [".mat", ".json", ".jsonl", ".npz", ".npy", ".h5"])
+def test_an_empty_file_and_a_folder_are_called_so(tmp_path, suffix):
+    if suffix == ".h5":
+        pytest.importorskip("h5py", reason="h5py, of the extra hdf5, is not installed")
+    (tmp_path / f"empty{suffix}").touch()
+    with pytest.raises(InputError, match=r"is not .*: the file is empty; copy or record it again"):
+        read_columns(tmp_path / f"empty{suffix}", ["t"])
+    (tmp_path / f"folder{suffix}").mkdir()
+    for use in (held_columns, lambda path: read_columns(path, ["t"])):
+        with pytest.raises(
+            InputError, match="is a folder, not a file; name the files in it, as in"
+        ):
+            use(tmp_path / f"folder{suffix}")
