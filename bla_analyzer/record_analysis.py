@@ -19,12 +19,14 @@ from .bla.arbitrary import ArbitraryBla, arbitrary_bla, run_of
 from .bla.sensitivity import of_this_loop
 from .checks import reliable_lines
 from .compare.metrics import ReferenceModel, compare
-from .results.result import LevelResult, LineLevels, Result
+from .results.result import BlaEstimate, LevelResult, LineLevels, Result
 
 MOST_SAMPLES = 2**22
 """A longer record is cut into equal parts, each with a transient of its own."""
 MOST_SHOWN = 20_000
 """Samples of the time signals that a result holds, at the most; of longer records every n-th."""
+FEWEST_LINES = 8
+"""Frequencies with an estimate, below which there is no response to speak of."""
 GAUSSIAN_KURTOSIS = (2.3, 4.5)
 """A signal whose kurtosis lies outside is far from Gaussian: a sine has 1.5, a normal signal 3."""
 
@@ -235,11 +237,33 @@ def _time_signals(signals: Sequence[np.ndarray], sample_rate_hz: float) -> TimeS
     return TimeSignals(time_s=time_s, reference_rad=r, torque_nm=u, position_rad=y)
 
 
+def _lines_left(level: LevelResult, bla: BlaEstimate) -> Check:
+    """Tell whether enough frequencies carry an estimate to speak of a response."""
+    kept, f = bla.frequency_hz.size, bla.frequency_hz
+    whole = kept + level.left_out_hz.size
+    sentence = (
+        f"{kept} of {whole} frequencies carry an estimate, from {f[0]:.4g} to {f[-1]:.4g} Hz"
+        + (
+            "."
+            if kept >= FEWEST_LINES
+            else ", too few to be a response: excite more, or record longer."
+        )
+    )
+    return Check(
+        name="lines_left",
+        level=level.level,
+        passed=kept >= FEWEST_LINES,
+        value=float(max(FEWEST_LINES - kept, 0)),
+        limit=0.0,
+        sentence=f"level {level.level}: {sentence}",
+    )
+
+
 def _checks(level: LevelResult, groups: Sequence[Sequence[Record]]) -> list[Check]:
     """Return the checks of a level of records."""
     if level.bla is None:
         return [reliable_lines(level.level, None)]
-    made = [reliable_lines(level.level, level.bla)]
+    made = [reliable_lines(level.level, level.bla), _lines_left(level, level.bla)]
     lines = level.excited
     if all(_is_played(record.reference) for group in groups for record in group):
         value, sentence = compare_units(following(lines.reference, lines.position))

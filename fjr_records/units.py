@@ -46,7 +46,8 @@ def compare_units(ratio: float) -> tuple[float, str]:
     mend = "give position and reference in rad (fjr import converts: {}=COLUMN:deg)."
     if ratio > FOLLOWING_LIMIT:
         unit = unit_taken_for_rad(ratio)
-        cause = "their units differ"
+        cause = "their units differ (y may be in counts of an encoder)"
+        mend = mend if unit else mend.replace(":deg", ":FACTOR")
         if unit is not None:
             factor = _TAKEN_FOR_RAD[unit]
             cause = f"y seems to be in {unit} and taken for rad, which gives {factor:.4g}"

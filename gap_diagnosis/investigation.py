@@ -25,9 +25,9 @@ from .model.record_length import within
 from .model.rig_model import Model
 from .model.steady_runs import SteadyRuns
 from .outcome.diagnosis import Bags, Diagnosis
-from .outcome.verdict_words import LOST, ROUNDING
+from .outcome.verdict_words import BACKWARDS, LOST, ROUNDING
 from .verdict.coarse_encoder import with_coarse_encoder
-from .verdict.judgement import judge, reproduced
+from .verdict.judgement import driven_backwards, judge, reproduced
 from .verdict.kept_causes import kept
 from .verdict.notes import of_fit, of_records, yielding
 from .verdict.tested_causes import LEAST_PRESENT, Tested
@@ -190,10 +190,11 @@ def investigate_runs(
     bags, scatter, said = _run_scatter(fitter, found.best)
     heard += said
     found, tested = kept(fitter, found, scatter, progress, names, until)
+    backwards = driven_backwards(evidence)
     lost = reproduced(fitter, found.best) < LEAST_PRESENT
-    if (tested or not names) and lost:
+    if backwards or ((tested or not names) and lost):
         found, tested = replace(found, steps=found.steps[:1]), []
-        heard.append(LOST)
+        heard.append(BACKWARDS if backwards else LOST)
     heard += yielding([t.effect for t in tested], fitter.misfit(found.best))
     progress("what may stand in for a cause")
     tied = {t.effect: _tied(fitter, found, t, names) for t in tested}

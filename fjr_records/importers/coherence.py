@@ -115,9 +115,14 @@ def unit_doubt(ratio: float, one: str, other: str) -> str | None:
         return None
     unit = unit_taken_for_rad(times)
     if unit is None:
-        return None
+        return (
+            f"the {large} is {times:.3g} times the {small}, as if it were in counts of an encoder, "
+            "in another unit or on the other side of a gear; give its factor to rad, as in "
+            f"{large}=COLUMN:FACTOR"
+        )
     short = {"degrees": "deg"}.get(unit, unit)
+    counts = "" if unit == "degrees" else f", or {large}=COLUMN:FACTOR if it counts encoder steps"
     return (
         f"the {large} is {times:.3g} times the {small}, as if it were in {unit} and taken for rad; "
-        f"give its unit, as in {large}=COLUMN:{short}"
+        f"give its unit, as in {large}=COLUMN:{short}{counts}"
     )

@@ -12,13 +12,20 @@ from fjr_kit.errors import InputError
 from .source import Heading
 from .stated_units import stated_unit, unit_of
 
-_ANGLE = {"rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "deg": math.pi / 180.0, "rev": 2.0 * math.pi}
-_TORQUE = {"N m": 1.0, "Nm": 1.0, "mN m": 1e-3, "mNm": 1e-3, "kN m": 1e3, "kNm": 1e3}
-_LENGTH = {"m": 1.0, "mm": 1e-3, "um": 1e-6}
+_DEGREE = math.pi / 180.0
+_ANGLE = {
+    "rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "deg": _DEGREE, "mdeg": 1e-3 * _DEGREE,
+    "arcmin": _DEGREE / 60.0, "arcsec": _DEGREE / 3600.0, "rev": 2.0 * math.pi,
+}  # fmt: skip
+_TORQUE = {
+    "N m": 1.0, "Nm": 1.0, "mN m": 1e-3, "mNm": 1e-3, "kN m": 1e3, "kNm": 1e3,
+    "N cm": 1e-2, "Ncm": 1e-2, "N mm": 1e-3, "Nmm": 1e-3,
+}  # fmt: skip
+_LENGTH = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
 _FORCE = {"N": 1.0, "kN": 1e3}
-_TURNING = {"rad/s": 1.0, "deg/s": math.pi / 180.0, "rpm": math.pi / 30.0, "rev/s": 2.0 * math.pi}
+_TURNING = {"rad/s": 1.0, "deg/s": _DEGREE, "rpm": math.pi / 30.0, "rev/s": 2.0 * math.pi}
 _SLIDING = {"m/s": 1.0, "mm/s": 1e-3}
-_TIME = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+_TIME = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
 UNITS: Mapping[str, Mapping[str, float]] = {
     "reference": _ANGLE | _LENGTH | _TURNING | _SLIDING,
     "torque": _TORQUE | _FORCE,
@@ -101,8 +108,8 @@ class Column:
             default = next(iter(units))
             raise InputError(
                 f"{path}: {quantity} is mapped to {heading.title}, which the file says to be in "
-                f"{stated}; give the factor that leads to {default}, as in {quantity}={self.name}"
-                ":0.25, or map another column."
+                f"{stated}; give the unit, or the factor that leads to {default}, as in "
+                f"{quantity}={self.name}:0.25, or map another column."
             )
         return replace(self, factor=self.factor * units[stated], unit=stated, stated=True)
 
@@ -165,7 +172,22 @@ def parse_map(
         if signal not in columns:
             raise InputError(f"the map has {quantity} but no {signal}; add {signal}=COLUMN.")
     refuse_both_axes("the map", columns)
+    _refuse_one_for_two(columns)
     return columns
+
+
+def _refuse_one_for_two(columns: Mapping[str, Column]) -> None:
+    """Raise InputError if one column is mapped to two signals."""
+    first: dict[str, str] = {}
+    for quantity, column in columns.items():
+        if is_time(quantity):
+            continue
+        other = first.setdefault(column.name, quantity)
+        if other != quantity:
+            raise InputError(
+                f"the map has {other} and {quantity} in one column, {column.name}; map the column "
+                f"of each, or leave {quantity} out."
+            )
 
 
 def is_time(quantity: str) -> bool:

@@ -11,8 +11,8 @@ import numpy as np
 from controller_node.transfer_function import TransferFunction
 from fjr_kit.errors import InputError
 
-from ..driven import wrong_sign
-from ..units import may_stick
+from ..driven import opposes, wrong_sign
+from ..units import may_stick, unit_taken_for_rad
 from . import coherence, part
 from .columns import read_columns
 from .import_map import OWN_TIME, TIME, Column, is_time, refuse_both_axes
@@ -244,9 +244,10 @@ def understand(
     doubts = samples.doubts + _unit_doubts(path, signals, repetition, columns)
     if not (np.ptp(signals["u"]) > 0 or options.swings_free):
         doubts += ("the torque is constant, so no response can be told from this run",)
-    brakes = wrong_sign(signals["u"], signals["y"])
-    if brakes is not None:
-        doubts += (f"{brakes}: --map torque=-COLUMN turns it",)
+    if (against := wrong_sign(signals["u"], signals["y"])) is not None:
+        doubts += (f"{against}: --map torque=-COLUMN or position=-COLUMN turns it",)
+    if "r" in signals and (against := opposes(signals["r"], signals["y"])) is not None:
+        doubts += (f"{against}: --map reference=-COLUMN or position=-COLUMN turns it",)
     other = coherence.unrelated(signals, repetition)
     if other is not None:
         raise InputError(f"{path}: {other}.")
@@ -275,6 +276,7 @@ def _unit_doubts(
         if doubt is None:
             continue
         meant = columns[one].by_factor or columns[other].by_factor
+        meant = meant or (one == "link" and unit_taken_for_rad(max(ratio, 1.0 / ratio)) is None)
         if not (meant or (one == "position" and may_stick(ratio))):
             raise InputError(f"{path}: {doubt}.")
         doubts.append(doubt)

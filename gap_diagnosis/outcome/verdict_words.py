@@ -24,6 +24,10 @@ LOST = (
     "runs are sampled fast enough for the rig, and whether another axis moved beside this one: no "
     "model of a single axis has the torques of others."
 )
+BACKWARDS = (
+    "In most runs the torque goes against the acceleration, as if it moved a negative mass, so no "
+    "cause is named: import the records with the sign of torque or position turned."
+)
 TWISTS = (
     "The link has an encoder, so the twist of the transmission is compared beside the motion, less "
     "what two encoders differ by: zero, scale, and time between their samples."

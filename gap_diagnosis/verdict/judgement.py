@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from fjr_records.driven import goes_backwards
+
 from ..gates.gate_checks import GateReport
 from ..how_far.ledger import Ledger
 from ..model.evidence import Evidence
@@ -136,6 +138,14 @@ def reproduced(fitter: CellFitter, fit: CellFit) -> float:
     if fitter.misfit(fit) < PLAIN:
         return 1.0
     return max(1.0 - float(np.mean(Ledger(fitter.evidence).squares(fit.model))), 0.0)
+
+
+def driven_backwards(evidence: Evidence) -> bool:
+    """Tell whether the recorded torque, which no described law makes, has the wrong sign."""
+    if evidence.slow or evidence.player.loop.commanded or evidence.records.swings_free:
+        return False
+    against = [goes_backwards(r.torque, r.position) for r in evidence.records.records]
+    return sum(against) > len(against) / 2
 
 
 def _on_parameters(verdict: Verdict, best: CellFit, fitter: CellFitter) -> list[str]:

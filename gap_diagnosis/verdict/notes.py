@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from fjr_records.driven import wrong_sign
+from fjr_records.driven import opposes, wrong_sign
 
 from ..model.evidence import Evidence
 from ..model.twist import doubt_of, goes_along
@@ -92,6 +92,11 @@ def of_records(evidence: Evidence, nominal: Mapping[str, float]) -> list[str]:
     notes = list(loop.notes)
     if not loop.commanded:  # a controller that makes the torque has its sign
         doubted = [(r.name, wrong_sign(r.torque, r.position)) for r in evidence.records.records]
+        doubted += [
+            (r.name, opposes(r.reference, r.position))
+            for r in evidence.records.records
+            if r.reference is not None
+        ]
         notes += [f"{name}: {doubt}." for name, doubt in doubted if doubt is not None][:_SHOWN]
     if evidence.records.swings_free:
         notes.append(SWINGS_FREE)

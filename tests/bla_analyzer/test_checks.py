@@ -218,7 +218,7 @@ def test_a_reference_in_degrees_is_named_and_a_joint_that_sticks_is_not_said_to_
 def test_position_of_no_known_unit_and_without_reference():
     r, u, y = signals(4)
     strange = position_unit(read((r, u, 1e9 * y), grid()), LINES.excited)
-    assert not strange.passed and "their units differ; give" in strange.sentence
+    assert not strange.passed and "counts of an encoder); give" in strange.sentence
     open_loop = position_unit(read((u, u, 1e9 * y), grid()), LINES.excited)
     assert open_loop.passed and np.isnan(open_loop.value)
 

@@ -10,6 +10,7 @@ import rig_records as rigs
 from html_page import Page
 
 from bla_analyzer import analyze, load_result, write_result
+from bla_analyzer.record_analysis import _lines_left
 from bla_analyzer.results.findings import findings
 from bla_analyzer.results.summary import campaign, headline
 from fjr_interface.bags.writer import BagWriter
@@ -151,3 +152,15 @@ def test_the_report_of_records_has_the_sensitivity_or_says_why_not(tmp_path):
     shown = Page(page.read_text("utf-8"))
     assert not {"sensitivity", "loop"} & set(shown.data()["levels"][0])
     assert "No sensitivity: no reference was recorded" in " ".join(shown.texts)
+
+
+def test_how_many_frequencies_carry_an_estimate_is_told_and_a_few_are_no_response(tmp_path):
+    write(tmp_path / "rig" / "one", data())
+    result = analyze(tmp_path / "rig")
+    (left,) = [check for check in result.checks if check.name == "lines_left"]
+    assert left.passed and " frequencies carry an estimate, from 0." in left.sentence
+    (level,) = result.levels
+    few = level.bla.model_copy(update={"frequency_hz": level.bla.frequency_hz[:3]})
+    left = _lines_left(level, few)
+    assert not left.passed and left.sentence.startswith("level 0: 3 of ")
+    assert "too few to be a response: excite more" in left.sentence

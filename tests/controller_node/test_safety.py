@@ -185,7 +185,7 @@ def test_hardware_needs_all_limits_and_the_joints_name():
         with pytest.raises(InputError, match=f"hardware needs finite limits; give {missing}."):
             check_hardware({**checked(**given), "joint": "elbow"})
     for wrong in ("", "knee"):
-        with pytest.raises(InputError, match="hardware moves joint 'elbow'; give its name"):
+        with pytest.raises(InputError, match="hardware moves joint 'elbow'; confirm that"):
             check_hardware({**checked(**{**HARDWARE, "confirm": wrong}), "joint": "elbow"})
 
 

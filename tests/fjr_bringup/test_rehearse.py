@@ -168,7 +168,7 @@ LIMITS = """
         ({"hardware": True}, LIMITS, "--hardware is for --drive external"),
         ({"drive": EXTERNAL}, LIMITS, "say --hardware, or --no-hardware"),
         ({"drive": EXTERNAL, "hardware": True}, None, "hardware run needs a limits file"),
-        ({"drive": EXTERNAL, "hardware": True}, LIMITS, "give its name as confirm"),
+        ({"drive": EXTERNAL, "hardware": True}, LIMITS, "confirm that with confirm"),
         (
             {"drive": EXTERNAL, "hardware": True, "confirm": "joint"},
             LIMITS.replace("torque_limit_nm: 20.0, ", ""),

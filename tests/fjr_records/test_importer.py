@@ -152,6 +152,19 @@ def test_degrees_taken_for_rad_are_refused_unless_a_factor_says_that_they_are_me
     assert run("import", tmp_path / "rig.npz", *right).stderr == ""
 
 
+@pytest.mark.parametrize(
+    ("per_rad", "says"),
+    [(1e5, r"in counts of an encoder, .* position=COLUMN:FACTOR"),
+     (4096 / 6.283, "COLUMN:mrad, or position=COLUMN:FACTOR if it counts encoder steps")],
+)  # fmt: skip
+def test_counts_of_an_encoder_taken_for_rad_are_refused(tmp_path, run, per_rad, says):
+    values = record()
+    np.savez(tmp_path / "rig.npz", **{**values, "y": np.round(2.0 * per_rad * values["y"])})
+    words = ("--sample-rate-hz", RATE_HZ, "--map", "reference=r,torque=u,position=y")
+    done = run("import", tmp_path / "rig.npz", "--out", tmp_path / "a", *words)
+    assert done.exit_code == 2 and re.search(says, " ".join(done.stderr.split())), done.stderr
+
+
 def test_a_linear_axis_is_told_by_its_units_and_every_result_says_so(tmp_path, run):
     values = record()
     values["y"], values["r"] = 1e3 * values["y"], 1e3 * values["r"]
@@ -304,11 +317,11 @@ TIMED = (*SI_MAP, "time=t")
         (spoiled("y", 3, 1e308), options(), r"y holds 1e\+308 at sample 3"),
         (spoiled("r", 3, -1e200), options(), r"r holds -1e\+200 at sample 3"),
         (record(), options(sample_rate_hz=None), r"give a sample rate of up to 1e\+06 Hz, or map"),
-        (record(), options(sample_rate_hz=math.inf), r"give a sample rate of up to 1e\+06 Hz"),
+        (record(), options(sample_rate_hz=math.inf), r"give one above 0 and up to 1e\+06 Hz"),
         (stepped(1, 1, -2), options(*TIMED, sample_rate_hz=None), "goes back from 0.004 to 0 s"),
         ({**record(), "t": np.ones(800)}, options(*TIMED), "does not increase"),
         (stepped(), options(*TIMED, sample_rate_hz=400.0), "says 500 Hz, not 400 Hz"),
-        (record(), options(sample_rate_hz=1e308), r"give a sample rate of up to 1e\+06 Hz"),
+        (record(), options(sample_rate_hz=1e308), r"give one above 0 and up to 1e\+06 Hz"),
         (stepped(), options(*SI_MAP, "time=t:1e-12", sample_rate_hz=None), "correct its unit"),
         (record(), options(samples_per_period=160), "does not repeat after 160 samples"),
         (record(), options(samples_per_period=300), "no excited lines stand out"),

@@ -184,7 +184,7 @@ def test_wrong_stamps_are_refused_in_a_sentence(tmp_path, content, specs, says):
 def test_a_rate_that_is_none_is_refused_whatever_the_stamps(tmp_path, rate_hz, specs):
     wild = np.cumsum(np.random.default_rng(2).uniform(1e-3, 3e-3, SAMPLES))
     np.savez(tmp_path / "rig.npz", **arrays(w=wild))
-    with pytest.raises(InputError, match=r"give a sample rate of up to 1e\+06 Hz"):
+    with pytest.raises(InputError, match=r"give one above 0 and up to 1e\+06 Hz"):
         understood(tmp_path / "rig.npz", *specs, sample_rate_hz=rate_hz)
 
 

@@ -25,7 +25,31 @@ DEGREE = math.pi / 180.0
     [
         ("position", "act [deg]", "deg"),
         ("position", "Angle (°)", "deg"),
-        ("position", "Winkel / Grad", ""),
+        (
+            "position",
+            "Winkel / Grad",
+            "Grad",
+        ),  # degrees in German, else a hundredth of a right angle
+        ("position", "phi/°", "deg"),
+        ("position", "Istwinkel [Grad]", "Grad"),
+        ("position", "pos [arcsec]", "arcsec"),
+        ("position", "pos [turns]", "rev"),
+        ("position", "pos_inc", "inc"),
+        ("position", "CMD_DEG", "deg"),
+        ("position", "pos [deg.]", "deg"),
+        ("position", "pos (motor)", ""),
+        ("position", "pos [xyz]", "xyz"),
+        ("position", "log/theta", ""),
+        ("position", "pos [1]", ""),
+        ("position", "x [in]", "in"),
+        ("torque", "Torque [Ncm]", "Ncm"),
+        ("torque", "cur_mA", "mA"),
+        ("torque", "I_q [Arms]", "Arms"),
+        ("time", "t/s", "s"),
+        ("time", "Time [min]", "min"),
+        ("time", "TIME_MS", "ms"),
+        ("time", "stamp [usec]", "us"),
+        ("time", "log/t", ""),
         ("position", "rec.act_pos_mot_deg[0]", "deg"),
         ("position", "position_mrad", "mrad"),
         ("position", "qd_rad_s", "rad/s"),
@@ -39,7 +63,7 @@ DEGREE = math.pi / 180.0
         ("torque", "tau_Nm", "Nm"),
         ("torque", "tau_nm", "Nm"),
         ("torque", "Torque [N·m]", "N m"),
-        ("torque", "T [MNm]", ""),
+        ("torque", "T [MNm]", "MNm"),
         ("torque", "Iq {A}", "A"),
         ("torque", "torque_deg", ""),
         ("time", "time_ms", "ms"),
@@ -97,7 +121,7 @@ def test_a_stated_length_makes_the_axis_linear(tmp_path):
 
 def test_a_current_and_counts_need_a_factor(tmp_path):
     file = table(tmp_path / "run.csv", ("t", "I [A]", "y [counts]"))
-    with pytest.raises(InputError, match=r"torque is mapped to I \[A\], .* in A; give the factor"):
+    with pytest.raises(InputError, match=r"torque is mapped to I \[A\], .* in A; give the unit"):
         understood([file], "torque=I [A]", "position=y [counts]:0.01", "time=t")
     with pytest.raises(InputError, match=r"position=y \[counts\]:0\.25"):
         understood([file], "torque=I [A]:0.5", "position=y [counts]", "time=t")
@@ -123,3 +147,25 @@ def test_the_summary_says_whose_unit_it_is(run, tmp_path):
     done = run("import", file, "--map", "torque=u,position=y [deg],time=t", "--dry-run")
     assert done.exit_code == 0
     assert "(y [deg] in deg as the file says, times 0.0174533)" in done.output
+
+
+def test_a_unit_that_is_not_known_is_refused_in_brackets_and_in_a_row(tmp_path):
+    for names, units in ((("t", "u", "y [furlong]"), None), (("t", "u", "y"), ("s", "Nm", "xyz"))):
+        file = table(tmp_path / "run.csv", names, units=units)
+        with pytest.raises(InputError, match=r"which the file says to be in (furlong|xyz); give"):
+            understood([file], "torque=u", "position=2", "time=t")
+        (record,) = understood([file], "torque=u", "position=2:deg", "time=t").records
+        np.testing.assert_allclose(record.signals["y"], Y, rtol=1e-7, atol=1e-9)
+
+
+def test_minutes_and_newton_centimetres_are_what_they_are(tmp_path):
+    file = table(tmp_path / "run.csv", ("t [min]", "u [Ncm]", "y [turns]"), time=T / 60.0)
+    (record,) = understood([file], "torque=1", "position=2", "time=0").records
+    assert record.sample_rate_hz == pytest.approx(RATE, rel=1e-6)
+    np.testing.assert_allclose(record.signals["u"], U / 100.0, rtol=1e-7, atol=1e-9)
+    np.testing.assert_allclose(record.signals["y"], 360.0 * Y, rtol=1e-7, atol=1e-7)
+
+
+def test_one_column_is_not_two_signals():
+    with pytest.raises(InputError, match="reference and position in one column, y; map the column"):
+        parse_map(["reference=y", "torque=u", "position=y:deg"])
