@@ -17,6 +17,8 @@ from .structures import names_of
 _SMALL = 2**13
 """Most bytes of a text, or of references: of 8 bytes for each element of a cell array."""
 _EMPTY = "MATLAB_empty"
+_UNITS = ("units", "unit", "unit_string")
+"""Attributes that state a unit; the last one as TDMS files have it."""
 _DEEP, _MOST = 20, 10_000
 """References after references that are followed, and how much is looked at behind all of them."""
 
@@ -57,7 +59,7 @@ def open_hdf5(path: Path, kind: str = "HDF5") -> Names:
         elif item.attrs.get("MATLAB_class") == b"char" or h5py.check_string_dtype(item.dtype):
             texts[name] = _text(item) if _is_small(item) else ""
         else:
-            if unit := _attribute(item, "units") or _attribute(item, "unit"):
+            if unit := next(filter(None, (_attribute(item, each) for each in _UNITS)), ""):
                 units[name] = unit
             if item.dtype.kind in "fiub":
                 held[name] = item.shape, steps, None

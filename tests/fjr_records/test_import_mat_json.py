@@ -116,6 +116,15 @@ def test_channels_of_dspace_have_their_names_and_units(tmp_path, version):
         current.read_as(tmp_path / "a.mat", "torque", headings[names[1]])
 
 
+def test_degrees_that_a_recording_of_dspace_states_are_taken_as_such(tmp_path, run):
+    content = dspace(["angle", "torque"], ["deg", "Nm"])
+    savemat(tmp_path / "a.mat", content)
+    words = ("--dry-run", "--map", "position=angle,torque=torque,time=exp_001.X.Data")
+    done = run("import", tmp_path / "a.mat", *words)
+    assert "(angle in deg as the file says, times 0.0174533)" in done.stdout, done.stderr
+    assert "0.39 s at 100 Hz" in done.stdout or "0.4 s at 100 Hz" in done.stdout
+
+
 @pytest.mark.parametrize("version", WRITERS)
 def test_channels_of_one_name_keep_their_places(tmp_path, version):
     WRITERS[version](tmp_path / "a.mat", dspace(["Out1", "Out1"], ["", ""]))
@@ -153,11 +162,12 @@ def test_hdf5_states_units_in_attributes_and_what_is_empty_is_no_obstacle(tmp_pa
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file["run/q"], file["run/none"] = np.array([R, Y]), h5py.Empty(float)
         file["run/q"].attrs["units"] = "deg"
-        file["enc/data"], file["enc/unit"] = R, "mrad"
-    found, headings = read_columns(tmp_path / "a.h5", ["run.q[1]", "enc.data"])
-    np.testing.assert_array_equal(list(found.values()), [Y, R])
-    assert [each.unit for each in headings.values()] == ["deg", "mrad"]
-    assert sorted(names_in(tmp_path / "a.h5")) == ["enc.data", "run.q"]
+        file["enc/data"], file["enc/unit"], file["Log/t"] = R, "mrad", T
+        file["Log/t"].attrs["unit_string"] = "ms"
+    found, headings = read_columns(tmp_path / "a.h5", ["run.q[1]", "enc.data", "Log.t"])
+    np.testing.assert_array_equal(list(found.values()), [Y, R, T])
+    assert [each.unit for each in headings.values()] == ["deg", "mrad", "ms"]
+    assert sorted(names_in(tmp_path / "a.h5")) == ["Log.t", "enc.data", "run.q"]
 
 
 def test_references_that_lead_in_circles_end(tmp_path):
