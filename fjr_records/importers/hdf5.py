@@ -111,9 +111,7 @@ def open_hdf5(path: Path, kind: str = "HDF5") -> Names:
     except Exception:
         raise _unreadable(path, kind) from None
     columns = [name for name, (shape, *_) in held.items() if math.prod(shape) > 1]
-    return names_of(
-        path, columns, texts, find, {name: unit for name, unit in units.items() if unit}
-    )
+    return names_of(path, columns, texts, find, units)
 
 
 def _is_small(item: Any) -> bool:

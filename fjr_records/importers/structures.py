@@ -11,6 +11,8 @@ from .source import Heading, Names
 
 _DATA, _NAME, _UNIT = ("data", "value", "values"), ("name", "label"), ("unit", "units")
 """Fields, in small letters."""
+_LONGEST = 100
+"""Most letters of a name or a unit."""
 _OF_A_MAP = set(",:=")
 """What the map of columns takes for its own."""
 
@@ -41,8 +43,8 @@ def names_of(
     said = defaultdict[str, dict[str, str]](dict)
     for place, text in texts.items():
         parent, _, field = place.rpartition(".")
-        said[parent][field.lower()] = text.strip()
-    headings = {column: Heading(column, unit) for column, unit in (units or {}).items()}
+        said[parent][field.lower()] = _in_a_line(text)
+    headings = {each: Heading(each, _in_a_line(unit)) for each, unit in (units or {}).items()}
     for parent in fields.keys() & said.keys():
         data = [each for each in fields[parent] if each.rpartition(".")[2].lower() in _DATA]
         name = _first(said[parent], _NAME) if data else ""
@@ -72,5 +74,11 @@ def _first(texts: Mapping[str, str], fields: Sequence[str]) -> str:
     return next((texts[field] for field in fields if texts.get(field)), "")
 
 
+def _in_a_line(text: str) -> str:
+    """Return a text with single spaces, as a sentence takes it; empty if it is none for it."""
+    line = " ".join(text.split())
+    return line if line.isprintable() and len(line) <= _LONGEST else ""
+
+
 def _fits_a_map(title: str) -> bool:
-    return title.isprintable() and title[0] != "-" and not _OF_A_MAP & set(title)
+    return title[0] != "-" and not _OF_A_MAP & set(title)

@@ -135,6 +135,16 @@ def test_channels_of_one_name_keep_their_places(tmp_path, version):
 
 
 @pytest.mark.parametrize("version", WRITERS)
+@pytest.mark.parametrize("name", ["a" * 200, "\x07bell", " ", "-q", "exp_001.X.Data"])
+def test_a_name_that_no_map_can_hold_is_not_listed(tmp_path, version, name):
+    WRITERS[version](tmp_path / "a.mat", dspace([name, "iq"], ["x" * 200, "A"]))
+    assert sorted(names_in(tmp_path / "a.mat")) == ["exp_001.X.Data", "exp_001.Y[0].Data", "iq"]
+    found, headings = read_columns(tmp_path / "a.mat", ["exp_001.Y[0].Data", "exp_001.X.Data"])
+    np.testing.assert_array_equal(list(found.values()), [R, 1e3 * T])
+    assert [each.unit for each in headings.values()] == ["", "ms"]
+
+
+@pytest.mark.parametrize("version", WRITERS)
 def test_a_timeseries_as_a_structure_states_the_unit_of_its_data_alone(tmp_path, version):
     series = {"Name": "q", "Time": T, "Data": np.array([R, Y]), "Units": "deg"}
     WRITERS[version](tmp_path / "a.mat", {"ts": series, "enc": {"unit": "rev", "x": R}})
