@@ -51,7 +51,7 @@ def open_hdf5(path: Path, kind: str = "HDF5") -> Names:
         if isinstance(item, h5py.Group):
             item.visititems(lambda inside, each: sort_inner(name, inside, each, steps))
             return
-        if not isinstance(item, h5py.Dataset) or item.shape is None or _EMPTY in item.attrs:
+        if not isinstance(item, h5py.Dataset) or item.shape is None or item.attrs.get(_EMPTY):
             return
         if h5py.check_ref_dtype(item.dtype) is h5py.Reference:
             if _is_small(item) and len(steps) < _DEEP:

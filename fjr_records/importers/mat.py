@@ -6,16 +6,20 @@ import struct
 import warnings
 import zlib
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
+
+from fjr_kit.errors import InputError
 
 from .hdf5 import open_hdf5
 from .source import EXPANSION, LEAST_BYTES, Names, refuse_bomb, unreadable
 from .structures import names_of
 
-_HEADER, _COMPRESSED = 128, 15
-"""Of version 5: bytes before the first variable, and the type of a compressed one."""
+_HEADER, _MATRIX, _COMPRESSED = 128, 14, 15
+"""Of version 5: bytes before the first variable, the types of an array and of a compressed one."""
+_TYPES = {*range(1, 8), 9, *range(12, 19)}
+"""Of version 5: types of elements that there are."""
 _MARK = 4
 """Bytes of which one is zero in version 4, and none in version 5, which begins with words."""
 
@@ -29,7 +33,7 @@ def open_mat(path: Path) -> Names:
     """
     with path.open("rb") as file:
         head = file.read(10)
-    if head == b"MATLAB 7.3":
+    if head.startswith(b"MATLAB 7."):
         return open_hdf5(path, "MATLAB 7.3")
     from scipy.io import loadmat
 
@@ -40,7 +44,7 @@ def open_mat(path: Path) -> Names:
             warnings.simplefilter("ignore")  # about MATLAB objects, which are not read
             content = loadmat(path, simplify_cells=True)
     except Exception:  # scipy parses arbitrary bytes here: anything may go wrong
-        raise unreadable(path, "a readable MAT file", "save it again") from None
+        raise _unreadable(path) from None
     arrays: dict[str, np.ndarray] = {}
     texts: dict[str, str] = {}
     for key, value in content.items():
@@ -59,6 +63,8 @@ def _unpacked_size(path: Path) -> int:
             kind, length = struct.unpack(f"{order}II", tag)
             end = file.tell() + length
             size += length
+            if kind == _MATRIX and not _is_whole(file, end, order):
+                raise _unreadable(path)
             if kind == _COMPRESSED:
                 size -= length
                 decompress = zlib.decompressobj()
@@ -71,6 +77,28 @@ def _unpacked_size(path: Path) -> int:
                         part = decompress.unconsumed_tail
             file.seek(end)
     return size
+
+
+def _is_whole(file: BinaryIO, end: int, order: str) -> bool:
+    """Tell whether elements of types that there are fill an array of version 5 up to its end.
+
+    SciPy trusts the types, and the process would die of one that there is not.
+    """
+    while file.tell() < end:
+        kind, length = struct.unpack(f"{order}II", file.read(8).ljust(8, b"\0"))
+        if kind >> 16:  # up to four bytes, which stand in place of the length
+            kind, length = kind & 0xFFFF, 0
+        stop = file.tell() + length + -length % 8
+        if kind not in _TYPES or stop > end:
+            return False
+        if kind == _MATRIX and not _is_whole(file, stop, order):
+            return False
+        file.seek(stop)
+    return True
+
+
+def _unreadable(path: Path) -> InputError:
+    return unreadable(path, "a readable MAT file", "save it again")
 
 
 def _sort(name: str, value: Any, arrays: dict[str, np.ndarray], texts: dict[str, str]) -> None:

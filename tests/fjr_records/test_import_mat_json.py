@@ -5,9 +5,11 @@ from __future__ import annotations
 import json
 import math
 import struct
+from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.io.matlab
 from scipy.io import savemat
 
 from fjr_cli.import_summary import held_by
@@ -39,6 +41,37 @@ def test_mat_of_version_4_that_lies_about_its_size_is_refused(tmp_path, kind, ro
     (tmp_path / "a.mat").write_bytes(head + b"y\0" + bytes(800))
     with pytest.raises(InputError, match=r"a\.mat: is not a readable MAT file"):
         read_columns(tmp_path / "a.mat", ["y"])
+
+
+@pytest.mark.parametrize("kind", [0, 8, 10, 11, 19, 200, 70000])
+@pytest.mark.parametrize("content", [{"y": Y}, {"s": {"y": Y}}])
+def test_a_damaged_type_in_a_mat_file_ends_in_a_sentence_and_not_the_process(
+    tmp_path, content, kind
+):
+    savemat(tmp_path / "a.mat", content)
+    whole = (tmp_path / "a.mat").read_bytes()
+    damaged = whole.replace(struct.pack("<II", 9, 320), struct.pack("<II", kind, 320))
+    assert damaged != whole
+    (tmp_path / "a.mat").write_bytes(damaged)
+    with pytest.raises(InputError, match=r"a\.mat: is not a readable MAT file; save it again\.$"):
+        read_columns(tmp_path / "a.mat", ["y"])
+
+
+SCIPYS = sorted((Path(scipy.io.matlab.__file__).parent / "tests" / "data").glob("*.mat"))
+
+
+@pytest.mark.skipif(not SCIPYS, reason="SciPy is installed without its tests")
+def test_files_that_matlab_wrote_are_read():
+    damaged = {"bad_miuint32", "bad_miutf8_array_name", "corrupted_zlib_checksum",
+               "corrupted_zlib_data", "debigged_m4", "malformed1"}  # fmt: skip
+    refused = set()
+    for file in SCIPYS:
+        try:
+            held_columns(file)
+        except InputError as why:
+            if "read by h5py, not installed" not in str(why):
+                refused.add(file.stem)
+    assert refused <= damaged
 
 
 def dspace(names, units) -> dict:
