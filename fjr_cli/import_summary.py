@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from fjr_interface.experiment import Experiment, RecordDescription
+from fjr_kit.errors import shown
 from fjr_records.importers.columns import Held, held_columns
 from fjr_records.importers.importer import Understood
 from fjr_records.importers.likely_columns import likely_map
@@ -34,7 +35,8 @@ def held_by(path: Path) -> Iterator[str]:
         values = "not all finite real numbers"
         if one.range is not None:
             values = f"from {one.range[0]:.6g} to {one.range[1]:.6g}"
-        yield f"  {one.name:<{width}}  {shape:>14}  {values}"
+        title = f", called {shown(one.title)}" if one.title else ""
+        yield f"  {one.name:<{width}}  {shape:>14}  {values}{title}"
     if more:
         yield f"  and {more} more, not shown"
     likely = likely_map(_signals(columns))

@@ -14,6 +14,9 @@ be negative, and above which it is none that the torque only brakes: of 353 runs
 none has less than -0.06."""
 _FIRST = 4  # line: those before hold drift
 _FEWEST = 20  # lines
+_SLOWER = 8
+"""How far below half the sample rate lines end: above, signals that were logged a sample apart seem
+to go with the acceleration where they go with the velocity."""
 _OPPOSED = (0.5, 2.0)
 """Range of |Y/R| at the lowest lines within which a position is that of a position loop."""
 _LOWEST = 0.1  # of the power of the reference
@@ -39,7 +42,7 @@ def accelerates(torque: np.ndarray, position: np.ndarray) -> float:
 
     In [-1, 1]. It is near 1 where the torque moves a mass, small where it works against friction or
     a spring, and never far below zero: masses are positive. Lines up to half of the velocity's
-    power count.
+    power count, below an eighth of half the sample rate.
 
     Args:
         torque: u, float64 (samples,), N m.
@@ -52,7 +55,8 @@ def accelerates(torque: np.ndarray, position: np.ndarray) -> float:
     total = np.cumsum(power)
     if not total.size or not total[-1] > 0.0:
         return 0.0
-    top = max(int(np.searchsorted(total, 0.5 * total[-1])) + 1, min(_FEWEST, y.size))
+    top = min(int(np.searchsorted(total, 0.5 * total[-1])) + 1, y.size // _SLOWER)
+    top = max(top, min(_FEWEST, y.size))
     u, y, k = u[_FIRST:top], y[_FIRST:top], k[_FIRST:top] / top
     beside = [x - np.vdot(y, x).real / np.vdot(y, y).real * y for x in (u, -(k**2) * y)]
     most = float(np.prod([np.linalg.norm(x) for x in beside]))

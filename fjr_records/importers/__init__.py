@@ -6,8 +6,8 @@ hold) and `importer.write_bags`.
 - The map: `import_map` reads which column is which signal, in which unit; `likely_columns` proposes
   a map by the names of columns, `stated_units` takes units that the file states.
 - File formats: `columns` reads any of them, by `text`, `mat`, `numpy_file`, `hdf5` and `json_log`;
-  `source` is what they share, `table_head` reads the lines above a table in text. `record_file`
-  reads one file and says what is doubtful in it.
+  `source` is what they share, `structures` finds names and units beside data, `table_head` reads
+  the lines above a table in text. `record_file` reads one file and says what is doubtful in it.
 - Stamps: `timing` decides when samples were taken and brings them onto an even grid by `stamps`;
   `rounded_stamps` finds the even samples behind coarse stamps, `clock_stamps` reads calendar and
   clock, `split_stamps` joins seconds and nanoseconds, `own_stamps` are of signals that were not

@@ -78,7 +78,7 @@ def read_columns(
     path = Path(path)
 
     def columns(found: Names) -> tuple[dict[str, np.ndarray], dict[str, Heading]]:
-        headings = {name: found.headings.get(name, Heading(name)) for name in names}
+        headings = {name: found.heading(name) for name in names}
         beside = {name: nanoseconds_beside(headings[name].title, found.known) for name in names}
         asked = [*names, *(other for other in beside.values() if other is not None)]
         try:
@@ -121,12 +121,14 @@ class Held:
         shape: of the array.
         range: least and greatest value; None where it does not hold finite real numbers.
         holes: how many rows do not hold it.
+        title: what the file calls it, where that is not its name; else empty.
     """
 
     name: str
     shape: tuple[int, ...]
     range: tuple[float, float] | None
     holes: int = 0
+    title: str = ""
 
 
 def held_columns(path: str | Path) -> tuple[list[Held], int]:
@@ -147,17 +149,20 @@ def held_columns(path: str | Path) -> tuple[list[Held], int]:
 
 
 def _held(name: str, found: Names) -> Held:
+    title = found.heading(name).title
+    title = "" if title == name else title
     try:
         values = found.column(name, holes=True)
     except InputError:  # a damaged column, or a name that is there twice: said when it is asked for
-        return Held(name, (), None)
+        return Held(name, (), None, title=title)
     if values.dtype.kind not in "fiub":
-        return Held(name, values.shape, None)
+        return Held(name, values.shape, None, title=title)
     holes = np.isnan(values) & (found.find_with_holes is not None)
     there = values[~holes]
     if not there.size or not np.isfinite(there).all():
-        return Held(name, values.shape, None)
-    return Held(name, values.shape, (float(there.min()), float(there.max())), int(holes.sum()))
+        return Held(name, values.shape, None, title=title)
+    span = (float(there.min()), float(there.max()))
+    return Held(name, values.shape, span, int(holes.sum()), title)
 
 
 def _of_file(path: Path, use: Callable[[Names], Result]) -> Result:
@@ -167,8 +172,8 @@ def _of_file(path: Path, use: Callable[[Names], Result]) -> Result:
     suffix = suffixes[-2] if packed and len(suffixes) > 1 else path.suffix.lower()
     if path.is_dir():
         raise InputError(
-            f"{path}: is a folder; name the files in it, which hold the records (a bag needs no "
-            "import)."
+            f"{path}: is a folder, not a file; name the files in it, as in FOLDER/*.csv; a bag of "
+            "ROS 2 needs no import."
         )
     if not path.is_file():
         raise InputError(f"{path}: there is no such file.")

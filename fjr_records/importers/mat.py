@@ -1,4 +1,4 @@
-"""MATLAB files: version 5 (up to `-v7`) by SciPy; version 7.3 is HDF5."""
+"""MATLAB files: version 4 and 5 (up to `-v7`) by SciPy; version 7.3 is HDF5."""
 
 from __future__ import annotations
 
@@ -6,43 +6,54 @@ import struct
 import warnings
 import zlib
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 
 from fjr_kit.errors import InputError
 
 from .hdf5 import open_hdf5
-from .source import EXPANSION, LEAST_BYTES, Names, refuse_bomb
+from .source import EXPANSION, LEAST_BYTES, Names, refuse_bomb, unreadable
+from .structures import names_of
 
-_HEADER, _COMPRESSED = 128, 15
-"""Of version 5: bytes before the first variable, and the type of a compressed one."""
+_HEADER, _MATRIX, _COMPRESSED = 128, 14, 15
+"""Of version 5: bytes before the first variable, the types of an array and of a compressed one."""
+_TYPES = {*range(1, 8), 9, *range(12, 19)}
+"""Of version 5: types of elements that there are."""
+_MARK = 4
+"""Bytes of which one is zero in version 4, and none in version 5, which begins with words."""
 
 
 def open_mat(path: Path) -> Names:
     """Open a `.mat` file; raise InputError.
 
     A field of a structure is named `structure.field`, one of an array of structures
-    `structure[0].field`.
+    `structure[0].field`, or as a text beside it says (`structures`); an element of a cell array is
+    named `cell[0]`.
     """
     with path.open("rb") as file:
-        if file.read(10) == b"MATLAB 7.3":
-            return open_hdf5(path, "MATLAB 7.3")
+        head = file.read(10)
+    if head.startswith(b"MATLAB 7."):
+        return open_hdf5(path, "MATLAB 7.3")
     from scipy.io import loadmat
 
-    refuse_bomb(path, _unpacked_size(path))
+    if 0 not in head[:_MARK]:  # else of version 4, which compresses nothing
+        refuse_bomb(path, _unpacked_size(path))
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # about MATLAB objects, which are not read
             content = loadmat(path, simplify_cells=True)
     except Exception:  # scipy parses arbitrary bytes here: anything may go wrong
-        raise InputError(f"{path}: is not a readable MAT file; save it again.") from None
-    variables = _flatten(content)
-    return Names(path, list(variables), variables.__getitem__)
+        raise _unreadable(path) from None
+    arrays: dict[str, np.ndarray] = {}
+    texts: dict[str, str] = {}
+    for key, value in content.items():
+        _sort(key, value, arrays, texts)
+    return names_of(path, list(arrays), texts, arrays.__getitem__)
 
 
 def _unpacked_size(path: Path) -> int:
-    """Return how many bytes the variables of a MAT file take, or that it is one byte too many."""
+    """Return how many bytes the variables take, of version 5, or that it is one byte too many."""
     most = max(LEAST_BYTES, EXPANSION * path.stat().st_size) + 1
     size = 0
     with path.open("rb") as file:
@@ -52,6 +63,8 @@ def _unpacked_size(path: Path) -> int:
             kind, length = struct.unpack(f"{order}II", tag)
             end = file.tell() + length
             size += length
+            if kind == _MATRIX and not _is_whole(file, end, order):
+                raise _unreadable(path)
             if kind == _COMPRESSED:
                 size -= length
                 decompress = zlib.decompressobj()
@@ -66,26 +79,37 @@ def _unpacked_size(path: Path) -> int:
     return size
 
 
-def _flatten(structure: dict[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Return {dotted name: array} of all numeric variables with more than one element."""
-    flat: dict[str, Any] = {}
-    for key, value in structure.items():
-        if isinstance(value, dict):
-            flat |= _flatten(value, f"{prefix}{key}.")
-        elif isinstance(value, (list, np.ndarray)) and len(many := _structures(value)):
-            for index, one in enumerate(many):
-                flat |= _flatten(one, f"{prefix}{key}[{index}].")
-        elif isinstance(value, np.ndarray) and value.dtype.kind in "fiubc" and value.size > 1:
-            flat[prefix + key] = value
-    return flat
+def _is_whole(file: BinaryIO, end: int, order: str) -> bool:
+    """Tell whether elements of types that there are fill an array of version 5 up to its end.
 
-
-def _structures(value: Any) -> list[dict[str, Any]]:
-    """Return the structures of an array or a cell array of nothing else; empty for anything else.
-
-    Simulink's scopes keep their signals so.
+    SciPy trusts the types, and the process would die of one that there is not.
     """
-    if isinstance(value, np.ndarray) and value.dtype != object:
-        return []
-    many = list(value.ravel()) if isinstance(value, np.ndarray) else value
-    return many if all(isinstance(one, dict) for one in many) else []
+    while file.tell() < end:
+        kind, length = struct.unpack(f"{order}II", file.read(8).ljust(8, b"\0"))
+        if kind >> 16:  # up to four bytes, which stand in place of the length
+            kind, length = kind & 0xFFFF, 0
+        stop = file.tell() + length + -length % 8
+        if kind not in _TYPES or stop > end:
+            return False
+        if kind == _MATRIX and not _is_whole(file, stop, order):
+            return False
+        file.seek(stop)
+    return True
+
+
+def _unreadable(path: Path) -> InputError:
+    return unreadable(path, "a readable MAT file", "save it again")
+
+
+def _sort(name: str, value: Any, arrays: dict[str, np.ndarray], texts: dict[str, str]) -> None:
+    """Sort a variable, and all in it, into numbers of more than one element and texts, by name."""
+    if isinstance(value, dict):
+        for key, field in value.items():
+            _sort(f"{name}.{key}", field, arrays, texts)
+    elif isinstance(value, list) or (isinstance(value, np.ndarray) and value.dtype == object):
+        for index, element in enumerate(value if isinstance(value, list) else value.ravel()):
+            _sort(f"{name}[{index}]", element, arrays, texts)
+    elif isinstance(value, str):
+        texts[name] = value
+    elif isinstance(value, np.ndarray) and value.dtype.kind in "fiubc" and value.size > 1:
+        arrays[name] = value

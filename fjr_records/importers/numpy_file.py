@@ -9,7 +9,7 @@ import numpy as np
 
 from fjr_kit.errors import InputError
 
-from .source import Names, refuse_bomb, sample_axis
+from .source import Names, refuse_bomb, sample_axis, unreadable
 
 
 def open_npz(path: Path) -> Names:
@@ -40,9 +40,7 @@ def open_npy(path: Path) -> Names:
     try:
         array = np.load(path, mmap_mode="r", allow_pickle=False)
     except Exception:  # numpy parses arbitrary bytes here: anything may go wrong
-        raise InputError(
-            f"{path}: is not a NPY array of numbers; write it with numpy.save."
-        ) from None
+        raise unreadable(path, "a NPY array of numbers", "write it with numpy.save") from None
     if array.dtype.names:
         return Names(path, list(array.dtype.names), array.__getitem__)
     signals = np.atleast_2d(array) if array.ndim < 2 or sample_axis(array.shape) else array.T
@@ -52,4 +50,4 @@ def open_npy(path: Path) -> Names:
 
 
 def _unreadable(path: Path) -> InputError:
-    return InputError(f"{path}: is not a NPZ archive of numeric arrays; write it with numpy.savez.")
+    return unreadable(path, "a NPZ archive of numeric arrays", "write it with numpy.savez")

@@ -73,7 +73,7 @@ class Names:
         if name in self.known or name in self.unlisted:
             return np.asarray(find(name))
         match = _INDEXED.fullmatch(name)
-        if match is None or match["name"] not in self.known:
+        if match is None or match["name"] not in {*self.known, *self.unlisted}:
             raise self.missing(name if match is None else match["name"] or name)
         matrix, index = np.asarray(find(match["name"])), int(match["index"])
         axis = sample_axis(matrix.shape)
@@ -85,9 +85,15 @@ class Names:
             )
         return matrix[:, index] if axis == 0 else matrix[index]
 
+    def heading(self, name: str) -> Heading:
+        """Return what the file says of a column, for `name[i]` what it says of the matrix."""
+        match = None if name in self.headings else _INDEXED.fullmatch(name)
+        whole = Heading(name) if match is None else self.headings.get(match["name"], Heading(name))
+        return self.headings.get(name, whole)
+
     def missing(self, name: str) -> InputError:
         """Return the error for a name that is not there."""
-        nothing = "nothing, it is empty; record or copy it again" if self.empty else "nothing"
+        nothing = "nothing, it is empty; copy or record it again" if self.empty else "nothing"
         there = ", ".join(each[:_SHOWN] for each in self.known[:_SHOWN]) or nothing
         more = f" and {len(self.known) - _SHOWN} more" if len(self.known) > _SHOWN else ""
         return InputError(f"{self.path}: there is no {name}; the file holds {there}{more}.")
@@ -105,6 +111,19 @@ def refuse_bomb(path: Path, size: int, least: int = LEAST_BYTES) -> None:
             f"{path}: its {path.stat().st_size} bytes stand for {size:.2g} bytes of numbers, as no "
             "measured record does; write it again without compression."
         )
+
+
+def unreadable(path: Path, what: str, mend: str) -> InputError:
+    """Return the error for a file that is not what its name says.
+
+    Args:
+        path: the file.
+        what: what it should be.
+        mend: what to do, unless it is empty.
+    """
+    if not path.stat().st_size:
+        return InputError(f"{path}: is not {what}: the file is empty; copy or record it again.")
+    return InputError(f"{path}: is not {what}; {mend}.")
 
 
 def is_text(path: Path) -> bool:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from paths import ROOT
 
-KERNELS = '''
+KERNELS = """
 from fjr_kit.compiled import inlined, jit
 
 @inlined
@@ -21,7 +21,7 @@ def slow(x):
     for k in range(100):
         total += half(x) * k
     return total
-'''
+"""
 CALL = """
 import sys, time
 sys.path.insert(0, sys.argv[1])

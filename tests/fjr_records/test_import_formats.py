@@ -334,7 +334,7 @@ def test_broken_files_are_refused_in_a_sentence(tmp_path, name, content, says):
 
 def test_a_folder_is_no_file(tmp_path):
     for read in (held_columns, lambda path: read_columns(path, ["r"])):
-        with pytest.raises(InputError, match=r"is a folder; name the files in it, which hold the"):
+        with pytest.raises(InputError, match=r"is a folder, not a file; name the files in it"):
             read(tmp_path)
 
 
@@ -343,7 +343,7 @@ def test_an_empty_file_is_said_to_be_empty(tmp_path, name):
     (tmp_path / name).write_bytes(gzip.compress(b"") if name.endswith("gz") else b"")
     for read in (held_columns, lambda path: read_columns(path, ["r"])):
         with pytest.raises(
-            InputError, match=r"the file holds nothing, it is empty; record or copy it"
+            InputError, match=r"the file holds nothing, it is empty; copy or record it"
         ):
             read(tmp_path / name)
 
