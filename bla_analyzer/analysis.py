@@ -15,6 +15,7 @@ from fjr_interface.resampling.accuracy import Resampling
 from fjr_kit.errors import InputError
 from fjr_kit.telling import CountedProgress
 from fjr_records.any_folder import NOT_PERIODIC, open_folder
+from fjr_records.driven import wrong_sign
 from fjr_records.experiment_bag import Override
 from fjr_records.records import RecordSet
 
@@ -60,9 +61,18 @@ def analyze(
         raise InputError(f"method must be robust, fast or local, not {method!r}.")
     opened = open_folder(folder, signal_map, override=override, resampling=resampling)
     if isinstance(opened, RecordSet):
-        return _of_records(opened, method, models)
+        return _with_sign_doubts(_of_records(opened, method, models))
     has_reference = signal_map.reference is not None
-    return analyze_periodic(opened, method, models, has_reference, progress)
+    found = analyze_periodic(opened, method, models, has_reference, progress)
+    return _with_sign_doubts(found)
+
+
+def _with_sign_doubts(result: Result) -> Result:
+    """Return a result with a note on each level whose torque seems to have the wrong sign."""
+    shown = ((level.level, level.signals) for level in result.levels)
+    doubts = ((level, wrong_sign(s.torque_nm, s.position_rad)) for level, s in shown)
+    notes = tuple(f"level {level}: {doubt}." for level, doubt in doubts if doubt is not None)
+    return result.model_copy(update={"notes": (*result.notes, *notes)})
 
 
 def _of_records(

@@ -164,3 +164,14 @@ def test_how_many_frequencies_carry_an_estimate_is_told_and_a_few_are_no_respons
     left = _lines_left(level, few)
     assert not left.passed and left.sentence.startswith("level 0: 3 of ")
     assert "too few to be a response: excite more" in left.sentence
+
+
+def test_a_torque_of_the_wrong_sign_is_noted(tmp_path):
+    r, u, y = data()
+    write(tmp_path / "right" / "one", np.stack([r, u, y]))
+    write(tmp_path / "turned" / "one", np.stack([r, -u, y]))
+    told = {
+        name: any("has the wrong sign" in note for note in analyze(tmp_path / name).notes)
+        for name in ("right", "turned")
+    }
+    assert told == {"right": False, "turned": True}
