@@ -89,6 +89,7 @@ def import_records(
     ] = 1,
 ) -> None:
     """Turn records of a rig without ROS into bags that every command reads."""
+    from fjr_kit.atomic import refuse_existing
     from fjr_kit.errors import InputError
     from fjr_records.importers.import_map import parse_harmonics, parse_map
     from fjr_records.importers.importer import read_files, write_bags
@@ -106,8 +107,8 @@ def import_records(
         return
     if out is None and not dry_run:
         raise InputError("name the experiment folder with --out, or look first with --dry-run.")
-    if out is not None and (out.exists() or out.is_symlink()):
-        raise InputError(f"{out}: exists already; choose another folder or remove it.")
+    if out is not None:
+        refuse_existing(out)
     options = ImportOptions(
         columns=parse_map(
             [part for spec in column_map for part in spec.split(",")],

@@ -64,10 +64,9 @@ def _simulate_described(
 ) -> None:
     from fjr_bringup.campaign.batch_run import simulate_runs
     from fjr_bringup.campaign.progress import CampaignProgress
-    from fjr_kit.errors import InputError
+    from fjr_kit.atomic import refuse_existing
 
-    if folder.exists():
-        raise InputError(f"{folder}: exists already; choose another folder or remove it.")
+    refuse_existing(folder)
     runs, reference = described.runs(campaign, settings)
     rate = campaign.values["excitation"]["sample_rate_hz"]
     with CampaignProgress() as progress:

@@ -125,6 +125,12 @@ def write_whole(place: Path, content: str | bytes) -> None:
         path.write_bytes(content.encode() if isinstance(content, str) else content)
 
 
+def refuse_existing(place: Path) -> None:
+    """Raise InputError if a place where something new is to come is taken."""
+    if place.exists() or place.is_symlink():
+        raise InputError(f"{place}: exists already; choose another folder or remove it.")
+
+
 def new_partial(place: Path) -> Partial:
     """Claim a place, whose parents are made, for a folder that must not exist yet.
 
@@ -138,9 +144,11 @@ def new_partial(place: Path) -> Partial:
         raise InputError(
             f"{place}: cannot be made ({error.strerror}); choose a folder that can be written."
         ) from None
-    if place.exists() or place.is_symlink():
+    try:
+        refuse_existing(place)
+    except InputError:
         partial.clear_away()
-        raise InputError(f"{place}: exists already; choose another folder or remove it.")
+        raise
     return partial
 
 

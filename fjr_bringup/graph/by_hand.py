@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Collection
+from contextlib import ExitStack
 from typing import Any
 
 import rclpy
@@ -12,9 +13,9 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.executors import SingleThreadedExecutor
-from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import Trigger
 
+from fjr_interface.ros.session import ros_session
 from fjr_interface.topics import NAMESPACE, NODES, WRITERS, checked_namespace
 from fjr_interface.waiting import start
 from fjr_kit.errors import InputError
@@ -39,7 +40,8 @@ class Rig:
     def __enter__(self) -> Rig:
         """Join the domain; raise InputError if the environment names none."""
         own_domain()
-        rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+        self._stack = ExitStack()
+        self._stack.enter_context(ros_session())
         self._node = rclpy.create_node(f"fjr_{os.getpid()}", namespace=self._namespace)
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self._node)
@@ -49,7 +51,7 @@ class Rig:
         """Leave the domain."""
         self._executor.shutdown()
         self._node.destroy_node()
-        rclpy.try_shutdown()
+        self._stack.close()
 
     def trigger(self, service: str) -> str:
         """Call a service of type std_srvs/Trigger; return its message.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -12,11 +13,11 @@ from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import GetParameters, SetParametersAtomically
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import Trigger
 
 from fjr_interface.bags.folder_names import bag_folder
 from fjr_interface.experiment import Experiment
+from fjr_interface.ros.session import ros_session
 from fjr_interface.topics import NAMESPACE, NODES, Signal
 from fjr_kit.errors import InputError
 from fjr_kit.processes import ProcessGroup
@@ -50,7 +51,8 @@ class Conductor:
         self._processes = processes
         self._nodes = tuple(nodes)
         self._interruption = interruption
-        rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+        self._stack = ExitStack()
+        self._stack.enter_context(ros_session())
         self._node = rclpy.create_node("campaign", namespace=namespace)
         self._recorder_node = rclpy.create_node("recorder", namespace=namespace)
         self._recorder = recorder(self._recorder_node)
@@ -72,7 +74,7 @@ class Conductor:
         self._executor.shutdown()
         self._node.destroy_node()
         self._recorder_node.destroy_node()
-        rclpy.try_shutdown()
+        self._stack.close()
 
     def wait_for_graph(self) -> None:
         """Wait until every node is there, alone, and knows the recorder.

@@ -9,11 +9,11 @@ from pathlib import Path
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
 
 from fjr_interface.bags.folder_names import bag_folder
 from fjr_interface.bags.writer import BagWriter, keep_whole_periods
 from fjr_interface.experiment import Experiment
+from fjr_interface.ros.session import ros_session
 from fjr_interface.topics import NAMESPACE, SIGNALS, Signal, checked_namespace, stamp_ns
 from fjr_kit.stopping import Interruption
 
@@ -154,8 +154,7 @@ def record_by_hand(
         KeyboardInterrupt: Ctrl-C; the whole periods of the realization under way are kept.
     """
     domain, namespace = own_domain(), checked_namespace(namespace)
-    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
-    try:
+    with ros_session():
         node = rclpy.create_node("recorder", namespace=namespace)
         recorder = HandRecorder(node, signals)
         progress.say(f"Recording in ROS domain {domain}; {reach()}.")
@@ -178,8 +177,6 @@ def record_by_hand(
             finally:
                 recorder.abort()
         node.destroy_node()
-    finally:
-        rclpy.try_shutdown()
 
 
 def _record_one(

@@ -10,7 +10,6 @@ from typing import Any
 import rclpy
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-from rclpy.signals import SignalHandlerOptions
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 from rosbags.interfaces import Qos, QosDurability, QosHistory, QosReliability
 from rosbags.rosbag2 import StoragePlugin
@@ -19,6 +18,7 @@ from rosbags.typesys import Stores, get_typestore
 from fjr_interface.bags.qos import stated_qos
 from fjr_interface.bags.storage import ChecksummedWriter
 from fjr_interface.ros.messages import message_class
+from fjr_interface.ros.session import ros_session
 from fjr_kit.atomic import new_partial
 from fjr_kit.errors import InputError
 from fjr_kit.progress import ProgressLine
@@ -52,9 +52,8 @@ def record_topics(
     domain = own_domain()
     store = get_typestore(Stores.ROS2_JAZZY)
     partial = new_partial(bag)
-    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     try:
-        with Interruption() as interruption:
+        with ros_session(), Interruption() as interruption:
             node = rclpy.create_node("fjr_record")
             progress.say(f"Recording in ROS domain {domain}; {reach()}.")
             types = _types(node, topics, progress, interruption)
@@ -72,7 +71,6 @@ def record_topics(
             node.destroy_node()
     finally:
         partial.clear_away()
-        rclpy.try_shutdown()
 
 
 def _types(

@@ -14,6 +14,7 @@ from typing import Any
 
 from fjr_interface.parameter_file import save_parameter_file
 from fjr_interface.topics import NODES
+from fjr_kit.atomic import refuse_existing
 from fjr_kit.errors import InputError
 from fjr_kit.folder_lock import locked_folder
 from fjr_kit.processes import ProcessGroup
@@ -55,8 +56,8 @@ def replay_into(plan: ReplayPlan, out: Path | None) -> tuple[Path, dict[str, Dif
     """
     folder = out or plan.bag.absolute().parent / "replay" / plan.bag.name / plan.into
     kept = folder / plan.bag.name if out else None
-    if kept is not None and kept.exists():
-        raise InputError(f"{kept}: exists already; name another --out folder.")
+    if kept is not None:
+        refuse_existing(kept)
     with locked_folder(folder), _scratch() as scratch:
         place = kept or scratch / plan.bag.name
         _play(plan, place, scratch)

@@ -13,10 +13,10 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import ReliabilityPolicy
-from rclpy.signals import SignalHandlerOptions
 from rosgraph_msgs.msg import Clock
 
 from fjr_interface.ros import runtime
+from fjr_interface.ros.session import ros_session
 from fjr_interface.topics import checked_namespace, clock_message
 from fjr_kit.errors import InputError
 from fjr_kit.stopping import Interruption
@@ -54,20 +54,16 @@ def publish_bag(bag: Path, publishing: Publishing, sum_up: Callable[[Published],
     own_domain()  # refused by a sentence, unlike by rclpy
     namespace = checked_namespace(publishing.namespace)
     messages = Messages(bag, publishing.topics, namespace)
-    with Interruption() as interruption:
-        rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+    with Interruption() as interruption, ros_session():
+        node = rclpy.create_node(NODE, namespace=namespace, start_parameter_services=False)
+        player = Player(node, messages, publishing, interruption)
+        player.wait()
         try:
-            node = rclpy.create_node(NODE, namespace=namespace, start_parameter_services=False)
-            player = Player(node, messages, publishing, interruption)
-            player.wait()
-            try:
-                player.play()
-            except KeyboardInterrupt:
-                sum_up(player.published)
-                raise
+            player.play()
+        except KeyboardInterrupt:
             sum_up(player.published)
-        finally:
-            rclpy.try_shutdown()
+            raise
+        sum_up(player.published)
 
 
 class _Output:

@@ -5,13 +5,12 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from typing import Any
 
-import rclpy
 from rclpy.executors import ExternalShutdownException
 from rclpy.experimental import EventsExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
-from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
 from fjr_kit.errors import InputError
@@ -20,6 +19,7 @@ from fjr_kit.stopping import NodeInterruption
 from ..real_time import NEVER
 from .program import Program, refuse
 from .runtime import RigNode
+from .session import ros_session
 
 _IDLE_S = 0.2  # between two looks for Ctrl-C where nothing happens
 
@@ -42,9 +42,9 @@ def run(
         print(program.help())
         return 0
     nodes: list[RigNode] = []
-    with NodeInterruption() as interruption:
+    with NodeInterruption() as interruption, ExitStack() as ros:
         try:
-            _init(program, arguments)
+            _start_ros(ros, program, arguments)
             executor = EventsExecutor()
             for factory in factories:
                 nodes.append(factory())
@@ -62,18 +62,16 @@ def run(
                 node.leave()
             for node in nodes:
                 node.destroy_node()
-            rclpy.try_shutdown()
     return 0
 
 
-def _init(program: Program, arguments: Sequence[str]) -> None:
+def _start_ros(ros: ExitStack, program: Program, arguments: Sequence[str]) -> None:
     """Start ROS; raise InputError if it, or the program, does not take the arguments."""
     program.refuse(arguments)
     named = [program.name, *arguments]
     try:
         remove_ros_args(named)  # refuses what rclpy.init would refuse after a line in the log
-        # ROS would end the communication at once, before a controller takes its torque down.
-        rclpy.init(args=named, signal_handler_options=SignalHandlerOptions.NO)
+        ros.enter_context(ros_session(named))
     except rclpy_implementation.UnknownROSArgsError as error:
         raise InputError(
             f"ROS does not know the arguments {error} behind --ros-args; {program.name} --help "

@@ -15,7 +15,7 @@ from controller_node.transfer_function import TransferFunction
 from fjr_interface.bags.folder_names import bag_folder
 from fjr_interface.bags.writer import BagWriter
 from fjr_interface.topics import LINK_POSITION, MOTOR_POSITION, MOTOR_TORQUE, REFERENCE
-from fjr_kit.atomic import new_folder
+from fjr_kit.atomic import new_folder, refuse_existing
 from fjr_kit.errors import InputError
 
 from .describe import Description, describe
@@ -162,7 +162,6 @@ def import_files(
         InputError: see `read_files` and `write_bags`.
     """
     out = Path(out)
-    if out.exists():
-        raise InputError(f"{out}: exists already; choose another folder or remove it.")
+    refuse_existing(out)
     understood = read_files(files, options)
     return list(zip(understood.descriptions, write_bags(understood, out), strict=True))

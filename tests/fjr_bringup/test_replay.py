@@ -102,7 +102,9 @@ def test_a_bag_of_the_graph_comes_back_byte_by_byte_and_the_command_says_so(
     before = sorted(tmp_path.rglob("*"))
     refused = start("fjr_cli", *command, cwd=tmp_path)
     assert refused.exit_status() == 2
-    assert refused.output == f"again/{bag.name}: exists already; name another --out folder.\n"
+    assert (
+        refused.output == f"again/{bag.name}: exists already; choose another folder or remove it.\n"
+    )
     assert [
         path for path in sorted(tmp_path.rglob("*")) if path.suffix not in (".out", ".errors")
     ] == [path for path in before if path.suffix not in (".out", ".errors")]
