@@ -169,7 +169,15 @@ ENCODER: tuple[Effect, ...] = (
         "nearly invisible",
         "once-per-turn measurement error",
         (
-            size("amplitude_rad", "rad", "Amplitude of the angle error", 0.0, 0.5, absolute=True),
+            size(
+                "amplitude_rad",
+                "rad",
+                "Amplitude of the angle error",
+                0.0,
+                0.5,
+                absolute=True,
+                usual=0.05,
+            ),
             angle("phase_rad", "Phase at angle zero"),
         ),
         ({"amplitude_rad": (1e-3, 3e-2), "phase_rad": QUARTERS},),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -60,6 +61,8 @@ class EffectParameter(Parameter):
             where that is zero. Empty for all others.
         at_velocity: friction of the motor at a velocity for a size of one, where it is proportional
             to the size; None for all others.
+        usual: greatest size that machines have, in its unit; infinite where that depends on the
+            machine. What is greater may be, but rather stands for something else.
     """
 
     role: Role = "shape"
@@ -70,6 +73,7 @@ class EffectParameter(Parameter):
     falls_to: str = ""
     adds_to: str = ""
     at_velocity: AtVelocity | None = None
+    usual: float = math.inf
 
     def fit_bounds(self, scale: float) -> tuple[float, float]:
         """Return the least and the greatest value that a fit may take.
@@ -214,12 +218,13 @@ def size(
     absolute: bool = False,
     adds_to: str = "",
     at_velocity: AtVelocity | None = None,
+    usual: float = math.inf,
 ) -> EffectParameter:
     """Return a size: zero while the effect is off."""
     return EffectParameter(
         name, 0.0, unit, description, low, high,
         role="size", fit=fit, negligible=negligible, of_link=of_link, absolute=absolute,
-        adds_to=adds_to, at_velocity=at_velocity,
+        adds_to=adds_to, at_velocity=at_velocity, usual=usual,
     )  # fmt: skip
 
 

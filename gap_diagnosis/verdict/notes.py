@@ -8,13 +8,16 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from fjr_records.driven import opposes, wrong_sign
+from fjr_sim_node import effects as fx
 
 from ..model.evidence import Evidence
+from ..model.rig_model import Model
 from ..model.twist import doubt_of, goes_along
 from ..outcome.verdict_words import OUT_OF_TIME, ROUNDING, SWINGS_FREE, TWISTS
 from ..which.comparison import NOTHING_LEFT
 from ..which.found import Found
 from ..which.other_splits import YIELDS
+from ..which.presence import over_usual
 from ..which.search_space import Space
 
 _SHOWN = 3
@@ -124,6 +127,11 @@ def of_fit(found: Found) -> list[str]:
     """Return what a reader must know of the search and of the fit in which it ended."""
     best = found.best
     notes = [*found.notes, *at_limits(best.space, best.solution.x, best.model.plant)]
+    notes += [
+        unusual(best.model, effect)
+        for effect in best.effects
+        if over_usual(best.model, effect) > 1.0
+    ]
     if best.effects and not best.solution.converged:
         notes.append(
             f"The fit of {' + '.join(best.effects)} has not converged: the sizes, and their "
@@ -132,6 +140,17 @@ def of_fit(found: Found) -> list[str]:
     if not found.complete:
         notes.append(OUT_OF_TIME)
     return notes
+
+
+def unusual(model: Model, effect: str) -> str:
+    """Return what to think of an effect whose size is greater than machines have."""
+    name = next(n for n in fx.EFFECTS[effect].size_names if math.isfinite(fx.parameter(n).usual))
+    unit, most = fx.parameter(name).unit, fx.parameter(name).usual
+    return (
+        f"{effect} of {abs(model.effects[name]):.2g} {unit} is more than machines have (up to some "
+        f"{most:g} {unit}): something that acts alike and is in no catalogue may stand behind it, "
+        "such as an inertia or a gear ratio that changes with the angle."
+    )
 
 
 def at_limits(space: Space, x: np.ndarray, plant: Mapping[str, float]) -> list[str]:

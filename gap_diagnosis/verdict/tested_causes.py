@@ -21,6 +21,7 @@ from ..which.presence import (
     beyond_zero,
     cell_estimates,
     invariance,
+    over_usual,
 )
 from ..which.ripples_passed import doubt_of_shape, ripples_passed
 
@@ -49,6 +50,8 @@ _MUCH_LEFT = (0.3, 0.5)
 explanation leaves makes its causes doubtful: of 9 that left more than 0.4 in the blind checks 317
 to 320 none was right, of 17 that left 0.2 to 0.4 all but four."""
 _IF_MOST = 0.6  # of what a cause would be present, where more than that is left
+_UNUSUAL = (1.0, 3.0)  # times the greatest size that machines have, between which a size is doubted
+_IF_UNUSUAL = 0.6  # of what a cause of a greater size would be present
 
 
 @dataclass(frozen=True)
@@ -74,6 +77,7 @@ class Tested:
         in_band: how much of what is left without it, it closes where it gains most; see `closed`.
         beside_others: how much of what another cause does it closes there; see `beside_others`.
         ripples: how many of its ripples the motion passes; infinite for what has none.
+        unusual: its size over the greatest that machines have, see `EffectParameter.usual`.
     """
 
     effect: str
@@ -91,6 +95,7 @@ class Tested:
     over_noise: float = math.nan
     over_noise_closed: float = math.nan
     borne: float = 0.0
+    unusual: float = 0.0
 
     @property
     def passed(self) -> bool:
@@ -199,6 +204,7 @@ class Tested:
         )
         sure *= _IF_OF_FORM + (1.0 - _IF_OF_FORM) * float(beyond_form)
         sure *= doubt_of_shape(self.ripples)
+        sure *= float(np.interp(self.unusual, _UNUSUAL, (1.0, _IF_UNUSUAL)))
         if not self.certain or self.bounded is not None:
             sure *= _UNCERTAIN
         if not self.invariant:
@@ -244,6 +250,7 @@ def causes_with_tests(
                 _own_sizes(ledger, fit, without, sizes),
                 over_noise,
                 1.0 - _left_over_noise(fitter, fit, without),
+                unusual=over_usual(fit.model, effect),
             )
         )
     return found

@@ -57,7 +57,8 @@ class Extension:
             tried: effects that are left out, since they were tried.
         """
         names, nominal = self.effects, self._fitter.nominal
-        there = {*parent.effects, *tried, *self._one_cause(parent, steps)}
+        twice = self._one_cause(parent, steps)
+        there = {*parent.effects, *tried, *(twice & self._part_or_whole(parent))}
         effects = [e for e in names if e not in there]
         effects = founded(effects, parent.effects, nominal, names)
         screened = self.screened(parent, effects)
@@ -90,6 +91,7 @@ class Extension:
         if not parent.effects and not self._fitter.evidence.slow and set(LACKED) & set(effects):
             self._progress("friction and load together")
             fits += self._fitter.together(parent, self.effects)
+        fits = [f for f in fits if f.effects[-1] not in twice or self._all_of_the_rest(f, parent)]
         return Polish(self._fitter, self._progress).polished(self.ranked(fits, parent), parent)
 
     def _sticking(self, parent: CellFit, effects: Sequence[str]) -> CellFit | None:
@@ -195,8 +197,23 @@ class Extension:
         most = max(gains.values(), default=0.0)
         return [e for e in ordered if gains[e] >= _START_LESS * most]
 
-    def _one_cause(self, parent: CellFit, steps: Sequence[CellFit]) -> list[str]:
-        """Return what could only name a cause of the parent twice; see `ONE_CAUSE`.
+    def _part_or_whole(self, parent: CellFit) -> set[str]:
+        """Return what a cause of the parent holds as a limit case, or is held by."""
+        held = {part for cause in parent.effects for part in fx.EFFECTS[cause].contains}
+        holding = {e for e in self.effects if {*fx.EFFECTS[e].contains} & {*parent.effects}}
+        return held | holding
+
+    def _all_of_the_rest(self, fit: CellFit, parent: CellFit) -> bool:
+        """Tell whether a fit closes nearly all of what its parent leaves over noise.
+
+        A near equivalent of a cause whose law has another form than the catalogue's mends a part of
+        that; only a cause of its own mends nearly all.
+        """
+        left, gap = self._fitter.misfit(fit) - 1.0, self._fitter.misfit(parent) - 1.0
+        return left < NEARLY_ALL * gap
+
+    def _one_cause(self, parent: CellFit, steps: Sequence[CellFit]) -> set[str]:
+        """Return what may only name a cause of the parent twice; see `ONE_CAUSE`.
 
         A cause that was added to others had but what these left to close; of one that came
         together with what the datasheet lacks it is not known what it closed.
@@ -209,7 +226,7 @@ class Extension:
             with_lacked = any(fx.EFFECTS[e].of_bare_plant for e in with_it)
             if not with_lacked and self._closes_nearly_all(parent, before):
                 named.append(effect)
-        return partners(named, set(self.effects), self._fitter.nominal)
+        return {*partners(named, set(self.effects), self._fitter.nominal)}
 
     def _closes_nearly_all(self, parent: CellFit, before: CellFit) -> bool:
         """Tell whether a fit leaves hardly anything of what another left.

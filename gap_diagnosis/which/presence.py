@@ -110,6 +110,13 @@ def at_its_bound(fit: CellFit, effect: str) -> str | None:
     return None
 
 
+def over_usual(model: Model, effect: str) -> float:
+    """Return the size of an effect over the greatest that machines have, 0 where any is usual."""
+    usual = {name: fx.parameter(name).usual for name in fx.EFFECTS[effect].size_names}
+    known = [abs(model.effects[n]) / most for n, most in usual.items() if math.isfinite(most)]
+    return max(known, default=0.0)
+
+
 @dataclass(frozen=True)
 class Invariance:
     """Whether an effect has one size at all levels.
