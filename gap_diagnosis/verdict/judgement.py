@@ -56,6 +56,12 @@ THIN = (
     "record more or longer runs."
 )
 
+RINGS = (
+    "The datasheet is that of a rigid axis, beside which a mass behind a spring is looked for "
+    "without damping of its own. If fjr analyze shows a resonance, of a frame, a belt or a load, "
+    "give the datasheet both inertias and the stiffness (jm, j, k0): its damping is fitted then."
+)
+
 
 def stopped(verdict: Verdict, gates: GateReport) -> Diagnosis:
     """Return the diagnosis of an experiment that a gate forbids to fit."""
@@ -125,7 +131,12 @@ def judge(
         bags=bags,
         ranking=_ranking(fitter, found),
         parameters=estimates,
-        notes=[*([THIN] if thin else []), *_on_parameters(verdict, best, fitter), *notes],
+        notes=[
+            *([THIN] if thin else []),
+            *([RINGS] if verdict == "unexplained" and refit.model.rigid else []),
+            *_on_parameters(verdict, best, fitter),
+            *notes,
+        ],
     )
 
 
