@@ -16,6 +16,8 @@ CONFIDENT = 0.8
 """From here on a claim that something is present counts as said for sure."""
 
 _CONSTANT_TORQUE = frozenset(("torque_bias", "asymmetric_friction", "gravity"))
+_BRINGS = {"backlash": frozenset(("transmission_damping",))}
+"""What else of the catalogue a law of the second plant holds: its shaft behind a gap is damped."""
 _LEVEL = 0.95  # |sine| of an angle above which gravity hardly changes around it
 _ANGLES = ("phase_rad", "angle_rad")
 
@@ -106,7 +108,9 @@ class Outcome:
 
     def is_right(self, claim: Claim) -> bool:
         """Tell whether a claim's set holds something that is there, weak as it may be."""
-        return any(claim.names & self.same(cause) for cause in (*self.asked, *self.answer.weak))
+        there = (*self.asked, *self.answer.weak)
+        names = [self.same(cause) | _BRINGS.get(cause.name, frozenset()) for cause in there]
+        return any(claim.names & each for each in names)
 
     @property
     def wrong_names(self) -> tuple[Claim, ...]:

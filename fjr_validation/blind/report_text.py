@@ -37,8 +37,9 @@ _MEANT = (
     "included. In the F1 true weak causes that are named count neither way. A constant torque "
     "passes for asymmetric Coulomb friction, bias, or gravity at right angles; backlash for the "
     "piecewise stiffness that contains it, presliding friction for the LuGre friction that "
-    "contains it; gravity on a rigid axis for cogging. A diagnosis that fails is a miss of all "
-    "that is asked. Intervals are of 95 %: Clopper-Pearson for shares of cases, else bootstrap "
+    "contains it; gravity on a rigid axis for cogging. Damping of the transmission is there "
+    "where backlash is, whose shaft is damped. A diagnosis that fails is a miss of all that is "
+    "asked. Intervals are of 95 %: Clopper-Pearson for shares of cases, else bootstrap "
     "over cases."
 )
 

@@ -110,6 +110,8 @@ def test_a_diagnosis_that_fails_misses_all_that_is_asked():
         (ONE, said("hysteresis"), True, 0),
         (ONE, said("hysteresis", present=0.79), False, 0),
         (ONE, said("backlash", "hysteresis"), True, 1),
+        (ONE, said("backlash", "transmission_damping"), False, 1),  # whose shaft is damped
+        (answer("open", "single", (LAG,)), said("transmission_damping"), True, 0),
         (TWO, said("backlash", "piecewise_stiffness"), False, 1),  # one cause is found once
         (TWO, said("actuator_lag", "backlash"), False, 2),
         (answer("open", "single", (LAG,), (GAP,)), said("backlash"), False, 0),  # weak, but there
