@@ -24,13 +24,13 @@ from .model.quasi_static import Stations
 from .model.record_length import within
 from .model.rig_model import Model
 from .model.steady_runs import SteadyRuns
-from .outcome.diagnosis import Bags, Diagnosis
+from .outcome.diagnosis import LEAST_PRESENT, Bags, Diagnosis
 from .outcome.verdict_words import BACKWARDS, LOST, ROUNDING
 from .verdict.coarse_encoder import with_coarse_encoder
 from .verdict.judgement import driven_backwards, judge, reproduced
 from .verdict.kept_causes import kept
 from .verdict.notes import of_fit, of_records, yielding
-from .verdict.tested_causes import LEAST_PRESENT, Tested
+from .verdict.tested_causes import Tested
 from .which.catalogue import catalogue
 from .which.cell_fits import DRIFT, CellFitter
 from .which.comparison import NOTHING_LEFT, CellFit

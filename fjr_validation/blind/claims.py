@@ -15,7 +15,7 @@ Interval = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Claim:
-    """One cause that a diagnosis lists.
+    """One cause that a diagnosis lists, or one that it doubts.
 
     Attributes:
         effect: what it is called.
@@ -33,7 +33,7 @@ class Claim:
 
 
 def claims(diagnosis: Mapping[str, Any]) -> tuple[Claim, ...]:
-    """Return what a diagnosis claims, as it orders it.
+    """Return what a diagnosis claims, as it orders it, and then what it doubts.
 
     Where it lists no `causes` (schema 1), each named effect is one, as surely present as the
     verdict is right.
@@ -52,7 +52,11 @@ def claims(diagnosis: Mapping[str, Any]) -> tuple[Claim, ...]:
             )
             for effect, group in _with_sets(named, diagnosis.get("equivalent") or [])
         )
-    return tuple(
+    doubted = (
+        Claim(one["effect"], frozenset((one["effect"],)), float(one["present"]), False, {})
+        for one in diagnosis.get("doubted", ())
+    )
+    listed = (
         Claim(
             cause["effect"],
             frozenset((cause["effect"], *(cause.get("or") or ()))),
@@ -63,6 +67,7 @@ def claims(diagnosis: Mapping[str, Any]) -> tuple[Claim, ...]:
         )
         for cause in causes
     )
+    return (*listed, *doubted)
 
 
 def _with_sets(named: list[str], sets: list[list[str]]) -> list[tuple[str, list[str]]]:

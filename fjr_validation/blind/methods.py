@@ -38,8 +38,8 @@ NEEDED: Mapping[str, tuple[str, ...]] = {
 """Libraries of the extra `rivals` that methods load."""
 
 KEPT = (
-    "verdict", "effects", "equivalent", "confidence", "reported_on", "causes", "steps", "remainder",
-    "evidence", "gap", "gap_closed", "parameters", "notes",
+    "verdict", "effects", "equivalent", "confidence", "reported_on", "causes", "doubted", "steps",
+    "remainder", "evidence", "gap", "gap_closed", "parameters", "notes",
 )  # fmt: skip
 """What is kept of a diagnosis; maps and rankings are not."""
 _DIGITS = 6

@@ -20,6 +20,8 @@ Verdict = Literal[
 ]
 ReportedOn = Literal["records", "blocks", "none"]
 Stage = Literal["nominal", "refit", "cause"]
+LEAST_PRESENT = 0.5
+"""A cause that is there less often than not is not called present."""
 LineKind = Literal["excited", "odd", "even", "dc", "slow", "all"]
 
 
@@ -159,6 +161,19 @@ class Cause(ResultModel):
     parameters: dict[str, Estimate] = Field(default_factory=dict)
 
 
+class Doubted(ResultModel):
+    """An effect that the search added and its tests took out again.
+
+    Attributes:
+        effect: its identifier.
+        present: probability that it is there nevertheless: up to one half, and more where only two
+            causes that gain more keep it from being named.
+    """
+
+    effect: str
+    present: float = Field(ge=0.0, le=1.0)
+
+
 class Step(ResultModel):
     """The gap that is left after a step of the explanation, on data that no fit has seen.
 
@@ -255,6 +270,7 @@ class Diagnosis(Document):
             held out.
         evidence: what the diagnosis rests on; None where a gate stopped it.
         causes: the named causes, greatest share first.
+        doubted: effects that were tested as causes and are not named, likeliest first.
         steps: the gap from step to step: nominal, refit, cause after cause.
         remainder: what is left; None where nothing was fitted.
         gap: the gaps at each stage.
@@ -276,6 +292,7 @@ class Diagnosis(Document):
     confidence: float = Field(ge=0.0, le=1.0)
     evidence: EvidenceKind | None = None
     causes: list[Cause] = Field(default_factory=list)
+    doubted: list[Doubted] = Field(default_factory=list)
     steps: list[Step] = Field(default_factory=list)
     remainder: Remainder | None = None
     gap: Gaps

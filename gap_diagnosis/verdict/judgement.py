@@ -18,6 +18,7 @@ from ..outcome.diagnosis import (
     Candidate,
     Cause,
     Diagnosis,
+    Doubted,
     Estimate,
     EvidenceKind,
     Gap,
@@ -122,6 +123,7 @@ def judge(
             compared="torque" if evidence.slow else "motion",
         ),
         causes=causes,
+        doubted=_doubted(found, causes),
         steps=steps,
         remainder=ledger.remainder(best.model, refit.model),
         gap=gaps_of(steps, ledger.noise()),
@@ -188,6 +190,13 @@ def _cause(
         where=ledger.places(moved),
         parameters=parameters,
     )
+
+
+def _doubted(found: Found, causes: Sequence[Cause]) -> list[Doubted]:
+    """Return what was found and is not named, nor in the set of a named cause."""
+    said = {name for cause in causes for name in (cause.effect, *cause.others)}
+    left = [Doubted(effect=e, present=p) for e, p in found.doubted.items() if e not in said]
+    return sorted(left, key=lambda one: -one.present)
 
 
 def gaps_of(steps: Sequence[Step], noise_floor: Gap | None) -> Gaps:

@@ -11,6 +11,7 @@ from dataclasses import replace
 from fjr_kit.telling import Progress
 from fjr_sim_node import effects as fx
 
+from ..outcome.diagnosis import LEAST_PRESENT
 from ..which.cell_fits import CellFitter
 from ..which.comparison import CellFit
 from ..which.equivalents import founded, partners
@@ -73,6 +74,7 @@ def kept(
     replaced: set[str] = set()
     bearing: set[str] = set()
     doubted: dict[str, float] = {}
+    nearly_named: set[str] = set()
 
     def tests_of(fit: CellFit) -> list[Tested]:
         progress(f"tests of {' + '.join(fit.effects)}")
@@ -106,14 +108,16 @@ def kept(
         if (guessed or nearly) and _bears(tested, tests):
             bearing.add(weakest.effect)
             continue
-        if guessed and weakest.passed:
-            doubted[weakest.effect] = weakest.present
+        passed = bool(guessed) and weakest.passed
+        doubted[weakest.effect] = min(weakest.present, 1.0 if passed else LEAST_PRESENT)
+        nearly_named |= {weakest.effect} if passed else set()
         notes += [*why_not(weakest)]
         steps, tested = fewer, tests
-    notes += unsure({e: p for e, p in doubted.items() if e not in steps[-1].effects})
+    doubted = {e: p for e, p in doubted.items() if e not in steps[-1].effects}
+    notes += unsure({e: p for e, p in doubted.items() if e in nearly_named})
     if tested and any(len(fit.effects) != count for count, fit in enumerate(steps)):
         steps = [steps[0], *_one_by_one(fitter, steps[-1], tested)]
-    return replace(found, steps=steps, notes=tuple(notes)), _bearing(tested)
+    return replace(found, steps=steps, notes=tuple(notes), doubted=doubted), _bearing(tested)
 
 
 def _without(names: set[str], tested: Sequence[Tested]) -> list[Tested]:

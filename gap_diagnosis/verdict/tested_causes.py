@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..how_far.ledger import Ledger
-from ..outcome.diagnosis import Figure
+from ..outcome.diagnosis import LEAST_PRESENT, Figure
 from ..which.cell_fits import CellFitter
 from ..which.comparison import CellFit
 from ..which.gains import LEAST_GAIN, MOST_P, Gain, beside_others, closed, fall, gain
@@ -25,8 +25,6 @@ from ..which.presence import (
 )
 from ..which.ripples_passed import doubt_of_shape, ripples_passed
 
-LEAST_PRESENT = 0.5
-"""A cause that is there less often than not is not called present."""
 LEAST_IN_BAND = 0.8
 """Of what is left in its best band, what a cause must close if its share of all is not certain."""
 _UNCERTAIN = 0.5  # of what a cause whose size is not certain would be present

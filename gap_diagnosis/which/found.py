@@ -17,6 +17,7 @@ class Found:
         alternatives: for each cause what does as well in its place.
         complete: whether the search ended by itself, not by its budget.
         notes: sentences on what was found but is not named.
+        doubted: what was found but is not named, with how surely it is present nevertheless.
     """
 
     steps: list[CellFit]
@@ -24,6 +25,7 @@ class Found:
     alternatives: dict[str, list[str]] = field(default_factory=dict)
     complete: bool = True
     notes: tuple[str, ...] = ()
+    doubted: dict[str, float] = field(default_factory=dict)
 
     @property
     def best(self) -> CellFit:

@@ -43,9 +43,9 @@ def said(
          "parameters": parameters or {}}
         for name in named
     ]  # fmt: skip
-    causes += [{"effect": name, "or": [], "present": 0.3, "parameters": {}} for name in doubted]
+    beside = [{"effect": name, "present": 0.3} for name in doubted]
     return {"verdict": "partly_explained" if named else "unexplained", "effects": list(named),
-            "causes": causes, "confidence": 0.5, "parameters": {}}  # fmt: skip
+            "causes": causes, "doubted": beside, "confidence": 0.5, "parameters": {}}  # fmt: skip
 
 
 def outcome(truth: Answer, diagnosis: dict[str, Any] | None) -> Outcome:

@@ -10,7 +10,7 @@ import pytest
 from test_evidence import NOMINAL, SCATTER, records
 
 from gap_diagnosis.model.evidence import Evidence
-from gap_diagnosis.outcome.diagnosis import Estimate
+from gap_diagnosis.outcome.diagnosis import LEAST_PRESENT, Estimate
 from gap_diagnosis.verdict import kept_causes as kept_causes_module
 from gap_diagnosis.verdict.kept_causes import (
     LEAST_BEARING,
@@ -26,7 +26,7 @@ from gap_diagnosis.verdict.kept_causes import (
     kept,
 )
 from gap_diagnosis.verdict.not_named import _bent, _changing, _kin
-from gap_diagnosis.verdict.tested_causes import LEAST_PRESENT, causes_with_tests
+from gap_diagnosis.verdict.tested_causes import causes_with_tests
 from gap_diagnosis.which import stepwise
 from gap_diagnosis.which.cell_fits import CellFitter
 from gap_diagnosis.which.found import Found
@@ -285,6 +285,8 @@ def test_within_a_search_what_nearly_passes_stays_if_without_it_sure_causes_fail
     monkeypatch.setattr(kept_causes_module, "_twice", lambda *_: [])
     found, tested = kept(fitter, Found(fits), SCATTER, lambda _: None, fits[-1].effects)
     assert {t.effect for t in tested} == set(found.best.effects) == kept_causes
+    assert set(found.doubted) == set(fits[-1].effects) - kept_causes
+    assert all(present <= LEAST_PRESENT for present in found.doubted.values())
 
 
 def test_what_nearly_passes_has_nothing_else_against_it(searched):
