@@ -16,7 +16,7 @@ from ..which.cell_fits import CellFitter
 from ..which.comparison import CellFit
 from ..which.equivalents import founded, partners
 from ..which.found import Found
-from ..which.gains import gain, left_of, stands_for
+from ..which.gains import NEARLY_ALL, gain, left_of, stands_for
 from ..which.seen_together import lacked
 from .judgement import FEWEST_PARTS
 from .not_named import unsure, why_not
@@ -251,10 +251,15 @@ def _one_by_one(fitter: CellFitter, fit: CellFit, tested: Sequence[Tested]) -> l
 def _twice(fitter: CellFitter, best: CellFit, tested: Sequence[Tested]) -> list[Tested]:
     """Return the causes that close little beside a near equivalent which closes little as well.
 
-    Little of what both close together; beside others, that may itself be little of the gap.
+    Little of what both close together; beside others, that may itself be little of the gap. What
+    closes nearly all of the rest is a cause of its own: a law of another form mends a part of it.
     """
     found: set[str] = set()
-    little = {t.effect: t for t in tested if t.share.value < _TWICE}
+    little = {
+        t.effect: t
+        for t in tested
+        if t.share.value < _TWICE and not t.over_noise_closed > 1.0 - NEARLY_ALL
+    }
     for effect, other in itertools.combinations(little, 2):
         if other not in fx.near_equivalents(effect):
             continue

@@ -5,8 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from gap_cases import SHORT, fitter_of, found_in, simulate_case, true_parameters
+from test_evidence import NOMINAL as RIG
+from test_evidence import records
 
 from fjr_sim_node.plant import PLANT
+from gap_diagnosis.any_record import investigate
 from gap_diagnosis.which.equivalents import plainness
 
 NOMINAL = PLANT.defaults()
@@ -85,3 +88,19 @@ def test_of_explanations_that_do_alike_one_that_holds_another_stands_last():
     assert plainness(rich, few, [rich]) < plainness(plain, more, [plain])
     common, rare = laws = [("gravity",), ("external_spring",)]
     assert plainness(common, few, laws) < plainness(rare, few, laws)
+
+
+@pytest.mark.parametrize("bias_nm", [0.0, 0.3])
+def test_a_weak_near_equivalent_of_a_cause_is_named_where_it_closes_the_rest(bias_nm):
+    """A constant torque beside a ripple is a hundredth of the gap, and nearly all that is left."""
+    effects = {
+        "cogging.amplitude_nm": 6.0,
+        "cogging.cycles_per_turn": 300.0,
+        "cogging.phase_rad": 0.7,
+    } | ({"torque_bias.torque_nm": bias_nm} if bias_nm else {})
+    few = ("cogging", "torque_bias", "delay")
+    told = investigate(records(effects), RIG, effects=few).diagnosis
+    assert set(told.effects) == {"cogging", *(["torque_bias"] if bias_nm else [])}
+    if bias_nm:
+        found = told.parameters["torque_bias.torque_nm"]
+        assert found.low < bias_nm < found.high
