@@ -173,7 +173,7 @@ ENCODER: tuple[Effect, ...] = (
         "The encoder counts in steps.",
         "encoder",
         "simulation.rig:measure",
-        Telltale("noise-like", "frequency"),
+        Telltale("noise-like, so that no simulation repeats it sample by sample", "frequency"),
         "uniform quantiser",
         (size("resolution_rad", "rad", "One count", 0.0, 1.0),),
         ({"resolution_rad": (2e-5, 2e-4, 1.5e-3, 8e-3)},),

@@ -38,7 +38,7 @@ def _words(cause: Cause) -> dict[str, Any]:
     telltale = EFFECTS[cause.effect].telltale
     name = explanation([cause.effect])
     what = {
-        "torque": "medians of the torque that",
+        "torque": "medians of the torque (grey: single samples) that",
         "lacking": "lacks",
         "added": f"what {name} adds",
     }

@@ -24,6 +24,7 @@ from ..model.steady_runs import SteadyRuns
 BINS = 24
 POINTS = 300
 _PER_DECADE = 16
+_FAR = 1e3  # times the motion: the error of a model that diverges
 _LEAST = 5  # samples of a bin, below which it shows nothing
 _UNSIGNED: tuple[Over, ...] = ("travel", "turn", "time")
 """What has no direction that could be folded."""
@@ -164,10 +165,11 @@ def _folded(
 
 def _travel(position: np.ndarray) -> np.ndarray:
     """Return how far the motion has gone since it last turned round, rad, (samples,)."""
-    ways = np.sign(np.diff(position, prepend=position[0]))
-    turned = np.flatnonzero(np.diff(ways, prepend=ways[0]) != 0.0)
+    moves, samples = np.sign(np.diff(position, prepend=position[0])), np.arange(position.size)
+    ways = moves[np.maximum.accumulate(np.where(moves != 0.0, samples, 0))]
+    turns = np.flatnonzero(np.diff(ways, prepend=ways[0]) != 0.0)
     last = np.zeros(position.size, int)
-    last[turned] = np.maximum(turned - 1, 0)
+    last[turns] = turns - 1
     return np.abs(position - position[np.maximum.accumulate(last)])
 
 
@@ -187,7 +189,14 @@ def _binned(at: np.ndarray, lacking: np.ndarray, left: np.ndarray) -> Shown:
 
 def _over_frequency(evidence: Evidence, without: Model, model: Model) -> Shown | None:
     """Return the rms of a line of the errors of both models, and of how far they lie apart."""
-    bare, full = evidence.errors([without, model], evidence.reporting)
+    which = evidence.reporting
+    bare, full = evidence.errors([without, model], which)
+    if np.abs(bare).max() > _FAR * np.abs(evidence.measured(which)).max():
+        return None
+    moved = bare - full
+    if model.rounds:  # what rounds is played as such, not by what that does on the average
+        itself = evidence.played_by(evidence.player.adding(None), evidence.noise_power)
+        moved = np.subtract(*itself.errors([without, model], which))
     lines = evidence.of_motion.size
     line = np.tile(np.arange(lines), bare.size // lines)
     motion = evidence.of_motion[line]
@@ -201,4 +210,4 @@ def _over_frequency(evidence: Evidence, without: Model, model: Model) -> Shown |
 
     center = np.bincount(place, frequency) / count
     nothing = np.empty(0)
-    return Shown(nothing, nothing, center, rms(bare), rms(bare - full), rms(full))
+    return Shown(nothing, nothing, center, rms(bare), rms(moved), rms(full))
