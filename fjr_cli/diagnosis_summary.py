@@ -27,7 +27,7 @@ from gap_diagnosis.outcome.verdict_words import (
     headline,
     is_better,
     meaning,
-    summaries,
+    summaries_with_telltales,
     unit_of,
 )
 
@@ -47,7 +47,7 @@ def print_summary(diagnosis: Diagnosis, console: Console, out: Path, *, runs: bo
     sure = f"(verdict: {diagnosis.verdict}, confidence {diagnosis.confidence:.0%})"
     _say(console, f"{headline(diagnosis)} {sure}")
     _say(console, f"{meaning(diagnosis)} {action(diagnosis)}")
-    for sentence in summaries(diagnosis):
+    for sentence in summaries_with_telltales(diagnosis):
         _say(console, sentence)
     if diagnosis.causes:
         print_table(console, *_causes(diagnosis))

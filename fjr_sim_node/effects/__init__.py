@@ -27,7 +27,7 @@ from fjr_interface.parameters import nearest
 from fjr_kit.errors import InputError, shown
 
 from .drive import DRIVE, ENCODER
-from .entry import AtVelocity, Effect, EffectParameter, Load
+from .entry import QUANTITIES, AtVelocity, Effect, EffectParameter, Load, Over, Telltale
 from .friction import FRICTION
 from .transmission import TRANSMISSION
 
@@ -37,10 +37,13 @@ __all__ = [
     "EFFECTS",
     "NAMES",
     "PARAMETERS",
+    "QUANTITIES",
     "AtVelocity",
     "Effect",
     "EffectParameter",
     "Load",
+    "Over",
+    "Telltale",
     "check_identifiers",
     "coefficients",
     "contains",

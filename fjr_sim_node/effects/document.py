@@ -10,7 +10,7 @@ import math
 from fjr_interface.parameters import Value
 from fjr_kit.document_tables import renew
 
-from . import CATALOGUE, Effect, EffectParameter
+from . import CATALOGUE, QUANTITIES, Effect, EffectParameter
 
 
 def table() -> str:
@@ -28,10 +28,12 @@ def table() -> str:
 
 
 def _effect_row(effect: Effect) -> str:
+    quantity, _ = QUANTITIES[effect.telltale.over]
     same = f" Equals {effect.same_as}." if effect.same_as else ""
     return (
         f"| **`{effect.identifier}`** | | | | {effect.summary} *Acts on: {effect.acts_on}. "
-        f"Telltale: {effect.telltale}.{same}* Source: {effect.source}. |"
+        f"Telltale: {effect.telltale.words}; drawn over {quantity}.{same}* "
+        f"Source: {effect.source}. |"
     )
 
 

@@ -6,7 +6,17 @@ import math
 
 import numpy as np
 
-from .entry import QUARTERS, Effect, EffectParameter, Load, angle, ripple, ripple_starts, size
+from .entry import (
+    QUARTERS,
+    Effect,
+    EffectParameter,
+    Load,
+    Telltale,
+    angle,
+    ripple,
+    ripple_starts,
+    size,
+)
 
 _SHARES = (0.15, 0.25, 0.4, 0.5, 0.6, 0.7, 0.75, 0.8, 0.85, 0.9, 0.94, 0.97, 1.0, 1.04, 1.1)
 """Torque limits over the greatest commanded torque: which peaks are clipped changes from one to
@@ -23,7 +33,7 @@ DRIVE: tuple[Effect, ...] = (
         "A constant torque adds to the commanded one.",
         "drive",
         "plant.torques:motor_drive",
-        "DC only",
+        Telltale("DC only", "position"),
         "drive offset",
         (size("torque_nm", "N m", "Constant torque", -1e4),),
         ({"torque_nm": (0.002,)},),
@@ -35,7 +45,7 @@ DRIVE: tuple[Effect, ...] = (
         "The motor torque ripples with the motor angle.",
         "drive",
         "plant.torques:motor_drive",
-        "even lines, falling with amplitude",
+        Telltale("even lines, falling with amplitude", "turn"),
         "Petrovic et al. 2000, IEEE Trans. Control Systems Technology 8(6)",
         ripple("amplitude_nm", "N m", 1e4, "the torque ripple"),
         ripple_starts("amplitude_nm", 0.002),
@@ -48,7 +58,7 @@ DRIVE: tuple[Effect, ...] = (
         "The torque acts later than commanded.",
         "drive",
         "simulation.rig:hold",
-        "phase, growing with frequency",
+        Telltale("phase, growing with frequency", "frequency"),
         "transport delay of bus and drive",
         (size("time_s", "s", "Transport delay", 0.0, 0.1),),
         ({"time_s": _PERIODS},),
@@ -60,7 +70,7 @@ DRIVE: tuple[Effect, ...] = (
         "The current loop follows the commanded torque with finite bandwidth.",
         "drive",
         "plant.motion:derivative",
-        "phase as delay, gain falls too",
+        Telltale("phase as delay, gain falls too", "frequency"),
         "first-order current loop",
         (size("time_constant_s", "s", "Time constant", 0.0, 0.1, negligible=0.005),),
         ({"time_constant_s": _PERIODS},),
@@ -72,7 +82,7 @@ DRIVE: tuple[Effect, ...] = (
         "The drive clips the torque.",
         "drive",
         "simulation.rig:limited",
-        "highest amplitude only",
+        Telltale("highest amplitude only", "command"),
         "drive limit; the knee as a motor's iron saturates",
         (
             EffectParameter("limit_nm", math.inf, "N m", "Greatest torque; .inf: no limit", 1e-6,
@@ -87,7 +97,11 @@ DRIVE: tuple[Effect, ...] = (
         "The drive gives less torque the faster the motor turns, since its voltage is limited.",
         "drive",
         "plant.torques:available",
-        "highest amplitude only, where torque and velocity have one sign",
+        Telltale(
+            "highest amplitude only, where torque and velocity have one sign",
+            "command",
+            "velocity",
+        ),
         "torque-speed line of a direct-current motor, Krause et al. 2013, ch. 2",
         (
             EffectParameter("stall_nm", math.inf, "N m", "Greatest torque at rest; .inf: no limit",
@@ -104,7 +118,7 @@ DRIVE: tuple[Effect, ...] = (
         "The torque of the drive changes at a limited rate.",
         "drive",
         "simulation.rig:driven",
-        "highest amplitude only, phase there",
+        Telltale("highest amplitude only, phase there", "command rate"),
         "rate limiter; limited current rise at the supply's voltage",
         (EffectParameter("limit_nm_s", math.inf, "N m/s", "Greatest rate; .inf: no limit", 1e-3,
                          role="limit", fit=(1e-4, 4.0)),),
@@ -117,7 +131,10 @@ DRIVE: tuple[Effect, ...] = (
         "The drive ignores small torque commands and shortens all others by as much.",
         "drive",
         "simulation.rig:driven",
-        "low amplitude only, as Coulomb friction but also where the motor does not move",
+        Telltale(
+            "low amplitude only, as Coulomb friction but also where the motor does not move",
+            "command",
+        ),
         "dead zone of an amplifier; Tao, Kokotovic 1994, IEEE TAC 39(1)",
         (size("width_nm", "N m", "Half width of the dead band"),),
         ({"width_nm": (0.003, 0.03)},),
@@ -128,7 +145,7 @@ DRIVE: tuple[Effect, ...] = (
         "The torque per command ripples with the motor angle.",
         "drive",
         "plant.torques:torque_ripple",
-        "even lines, flat with amplitude",
+        Telltale("even lines, flat with amplitude", "turn", "command"),
         "Petrovic et al. 2000, IEEE Trans. Control Systems Technology 8(6), current-dependent part",
         ripple("amplitude", "", 1.0, "the torque constant, relative"),
         ripple_starts("amplitude", 0.02),
@@ -140,7 +157,7 @@ DRIVE: tuple[Effect, ...] = (
         "The torque constant is not the one assumed.",
         "drive",
         "simulation.rig:hold",
-        "exactly equivalent to scaling all parameters",
+        Telltale("exactly equivalent to scaling all parameters", "command"),
         "torque-constant error",
         (size("relative_error", "", "Torque beyond the commanded one, relative", -0.9, 10.0),),
         ({"relative_error": (0.05,)},),
@@ -156,7 +173,7 @@ ENCODER: tuple[Effect, ...] = (
         "The encoder counts in steps.",
         "encoder",
         "simulation.rig:measure",
-        "noise-like",
+        Telltale("noise-like, so that no simulation repeats it sample by sample", "frequency"),
         "uniform quantiser",
         (size("resolution_rad", "rad", "One count", 0.0, 1.0),),
         ({"resolution_rad": (2e-5, 2e-4, 1.5e-3, 8e-3)},),
@@ -166,7 +183,7 @@ ENCODER: tuple[Effect, ...] = (
         "The encoder disc is off centre.",
         "encoder",
         "simulation.rig:measure",
-        "nearly invisible",
+        Telltale("nearly invisible", "turn"),
         "once-per-turn measurement error",
         (
             size(

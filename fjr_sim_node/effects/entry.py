@@ -25,6 +25,45 @@ AtVelocity = Callable[[np.ndarray], np.ndarray]
 """Takes velocities (rad/s); returns torques (N m) of a size of one."""
 
 
+Over = Literal[
+    "velocity", "travel", "position", "turn", "deflection", "deflection rate", "load", "command",
+    "command rate", "time", "frequency",
+]  # fmt: skip
+"""The quantity at which a law acts."""
+QUANTITIES: dict[Over, tuple[str, str]] = {
+    "velocity": ("motor velocity", "rad/s"),
+    "travel": ("travel of the motor since it turned round", "rad"),
+    "position": ("motor position", "rad"),
+    "turn": ("motor position within one period", "rad"),
+    "deflection": ("deflection of the transmission", "rad"),
+    "deflection rate": ("rate of the deflection", "rad/s"),
+    "load": ("torque in the gear", "N m"),
+    "command": ("commanded torque", "N m"),
+    "command rate": ("rate of the commanded torque", "N m/s"),
+    "time": ("time since the first run began", "s"),
+    "frequency": ("frequency", "Hz"),
+}
+"""Name and unit of each; frequency is that of what no torque at one of the others shows."""
+Along = Literal["", "velocity", "command", "deflection rate"]
+"""What a law has the direction of, so that both directions are folded into one; empty: nothing."""
+
+
+@dataclass(frozen=True)
+class Telltale:
+    """How an effect shows in the data, and the axis of the plot that shows it.
+
+    Attributes:
+        words: how it shows, in words.
+        over: over what the missing torque is drawn, or, over frequency, the error of the position.
+        along: in which direction that torque counts as positive, and what it is drawn over too, but
+            for an angle, travel and time, which have none.
+    """
+
+    words: str
+    over: Over
+    along: Along = ""
+
+
 @dataclass(frozen=True)
 class Load:
     """A torque on the joint that depends on nothing but the angle, linear in its sizes.
@@ -100,7 +139,7 @@ class Effect:
         summary: what it is, one sentence.
         acts_on: the part of the rig.
         law: the compiled function that holds it, `module:function` within `fjr_sim_node`.
-        telltale: how it shows in the data.
+        telltale: how it shows in the data, and over what.
         source: where the parametrisation comes from.
         parameters: its parameters, sizes first; the defaults switch it off.
         starts: where fits begin, relative to the scales of the record (those of a limit to its
@@ -139,7 +178,7 @@ class Effect:
     summary: str
     acts_on: Part
     law: str
-    telltale: str
+    telltale: Telltale
     source: str
     parameters: tuple[EffectParameter, ...]
     starts: tuple[Start, ...] = ()

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from .entry import AtVelocity, Effect, EffectParameter, Start, ripple, ripple_starts, size
+from .entry import AtVelocity, Effect, EffectParameter, Start, Telltale, ripple, ripple_starts, size
 
 # A level above Coulomb friction bends the bare parameters so far that small ones promise nothing;
 # a great level that falls within a small velocity would only make the plant stiff.
@@ -76,7 +76,7 @@ FRICTION: tuple[Effect, ...] = (
         "There is Coulomb friction where the datasheet has none.",
         "motor",
         "plant.flexible_joint:with_added",
-        "low amplitude, damped at all frequencies",
+        Telltale("low amplitude, damped at all frequencies", "velocity"),
         "paper eq. 2, fs sgn(q')",
         _lacking("Coulomb friction", "nm", "N m", "fsm", "fs", _constant),
         _on_either_side("nm", (0.02, 0.2)),
@@ -89,7 +89,7 @@ FRICTION: tuple[Effect, ...] = (
         "There is viscous friction where the datasheet has none.",
         "motor",
         "plant.flexible_joint:with_added",
-        "resonance damped at all amplitudes, low frequencies lower",
+        Telltale("resonance damped at all amplitudes, low frequencies lower", "velocity"),
         "paper eq. 2, fv q'",
         _lacking("Viscous friction", "nm_s_rad", "N m s/rad", "fvm", "fv", _linear),
         _on_either_side("nm_s_rad", (0.02,)),
@@ -102,7 +102,7 @@ FRICTION: tuple[Effect, ...] = (
         "Motor friction is higher at breakaway and falls with velocity.",
         "motor",
         "plant.torques:motor_level",
-        "low amplitude only",
+        Telltale("low amplitude only", "velocity"),
         _ARMSTRONG,
         _stribeck("motor"),
         _STRIBECK_STARTS,
@@ -113,7 +113,7 @@ FRICTION: tuple[Effect, ...] = (
         "Link friction is higher at breakaway and falls with velocity.",
         "link",
         "plant.torques:link_level",
-        "low amplitude only",
+        Telltale("low amplitude only", "velocity"),
         _ARMSTRONG,
         _stribeck("link"),
         _STRIBECK_STARTS,
@@ -124,7 +124,7 @@ FRICTION: tuple[Effect, ...] = (
         "Motor friction depends on the direction of motion.",
         "motor",
         "plant.torques:motor_level",
-        "DC; even lines if viscous",
+        Telltale("DC; even lines if viscous", "velocity"),
         "Swevers et al. 1997, IEEE Trans. Robotics and Automation 13(5)",
         (
             size("coulomb_nm", "N m", "Half the difference of Coulomb friction between the "
@@ -145,7 +145,7 @@ FRICTION: tuple[Effect, ...] = (
         "Friction builds up over a small displacement before sliding, as a stiff spring does.",
         "motor",
         "plant.presliding:bristle_torque",
-        "low amplitude, phase lead at the resonance",
+        Telltale("low amplitude, phase lead at the resonance", "travel", "velocity"),
         "Dahl 1968, TOR-158(3107-18); de Wit et al. 1995, IEEE TAC 40(3), without bristle damping",
         (
             size("motor_rad", "rad", "Displacement over which motor friction builds up", 0.0, 1.0,
@@ -164,7 +164,9 @@ FRICTION: tuple[Effect, ...] = (
         "Motor friction is that of bristles which bend, slip and hold less while they move.",
         "motor",
         "plant.motion:motor_friction",
-        "low amplitude, a spring before sliding and a lower level beyond",
+        Telltale(
+            "low amplitude, a spring before sliding and a lower level beyond", "travel", "velocity",
+        ),
         "Canudas de Wit, Olsson, Astrom, Lischinsky 1995, IEEE TAC 40(3); its damping, passive",
         (
             size("stribeck_nm", "N m", "Stribeck level: breakaway above Coulomb friction"),
@@ -190,7 +192,7 @@ FRICTION: tuple[Effect, ...] = (
         "Motor Coulomb friction grows with the torque in the gear.",
         "transmission",
         "plant.torques:motor_level",
-        "resonance lower at all amplitudes",
+        Telltale("resonance lower at all amplitudes", "load", "velocity"),
         "Hamon, Gautier, Garrec 2010, IROS, load-dependent gear friction",
         (size("coefficient", "", "Friction per torque in the gear", 0.0, 0.95, fit=(0.0, 0.9)),),
         ({"coefficient": (0.01, 0.05)},),
@@ -203,7 +205,7 @@ FRICTION: tuple[Effect, ...] = (
         "The gear loses torque, forward another share than backward.",
         "transmission",
         "plant.torques:motor_level",
-        "as load friction, other where the load drives the motor",
+        Telltale("as load friction, other where the load drives the motor", "load", "velocity"),
         "Wang, Kim 2015, IFToMM; gear efficiency forward and backward",
         (
             size("forward", "", "Friction per torque in the gear while the motor drives", 0.0,
@@ -225,7 +227,7 @@ FRICTION: tuple[Effect, ...] = (
         "Motor Coulomb friction varies with the motor angle.",
         "motor",
         "plant.torques:motor_level",
-        "even lines, small gain",
+        Telltale("even lines, small gain", "turn", "velocity"),
         "Armstrong 1988, position-dependent friction of geared joints",
         ripple("amplitude_nm", "N m", 1e4, "the variation of Coulomb friction"),
         ripple_starts("amplitude_nm", 0.002),
@@ -237,7 +239,7 @@ FRICTION: tuple[Effect, ...] = (
         "Drag grows with the square of velocity.",
         "motor",
         "plant.torques:motor_viscous",
-        "grows with amplitude",
+        Telltale("grows with amplitude", "velocity"),
         "fluid and lubricant drag, sgn(v) v^2",
         (
             size("motor_nm_s2_rad2", "N m s2/rad2", "Drag on the motor",
@@ -255,7 +257,7 @@ FRICTION: tuple[Effect, ...] = (
         "Coulomb and viscous friction drift with time, as they do while a gear warms up.",
         "time",
         "simulation.rig:hold",
-        "change between periods and realizations",
+        Telltale("change between periods and realizations", "time", "velocity"),
         "relative drift, linear in time over the whole experiment",
         (size("friction_per_s", "1/s", "Relative change of Coulomb and viscous friction per "
               "second", -0.1, 0.1),),

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .entry import Effect, EffectParameter, Load, angle, ripple, ripple_starts, size
+from .entry import Effect, EffectParameter, Load, Telltale, angle, ripple, ripple_starts, size
 
 _MODES = tuple(np.geomspace(0.08, 2.0, 44).tolist())
 """Frequencies of a light third mass over the highest with signal: it shows in a band as narrow as
@@ -35,7 +35,7 @@ TRANSMISSION: tuple[Effect, ...] = (
         "The transmission has a dead zone.",
         "transmission",
         "plant.spring:spring_torque",
-        "low amplitude, more gain at 2-13 Hz",
+        Telltale("low amplitude, more gain at 2-13 Hz", "deflection"),
         "Nordin, Gutman 2002, Automatica 38(10), dead-zone model",
         (size("half_gap_rad", "rad", "Half the dead zone of the deflection", 0.0, 1.0),),
         ({"half_gap_rad": (2e-3, 0.01, 0.04, 0.2)},),
@@ -47,7 +47,7 @@ TRANSMISSION: tuple[Effect, ...] = (
         "The transmission is soft around zero deflection and stiffer beyond (strain-wave gear).",
         "transmission",
         "plant.spring:spring_torque",
-        "near backlash, which it contains",
+        Telltale("near backlash, which it contains", "deflection"),
         "Spong 1987; manufacturers' three-slope stiffness of strain-wave gears",
         (
             size("zone_rad", "rad", "Half width of the soft zone", 0.0, 1.0),
@@ -61,7 +61,7 @@ TRANSMISSION: tuple[Effect, ...] = (
         "The transmission is stiffer in one direction than in the other.",
         "transmission",
         "plant.spring:spring_torque",
-        "even lines and DC, growing as the amplitude",
+        Telltale("even lines and DC, growing as the amplitude", "deflection"),
         "bilinear spring, k0 (1 + relative sgn d)",
         (size("relative", "", "Half the difference of the stiffnesses over k0", -0.95, 0.95),),
         ({"relative": (0.02,)},),
@@ -71,7 +71,7 @@ TRANSMISSION: tuple[Effect, ...] = (
         "The transmission stiffens with the cube of its torsion where the datasheet has it linear.",
         "transmission",
         "plant.flexible_joint:with_added",
-        "resonance higher at high amplitude",
+        Telltale("resonance higher at high amplitude", "deflection"),
         "paper eq. 3, k1",
         (size("stiffness_nm_rad3", "N m/rad3", "Cubic stiffness beyond k1", 0.0, 1e15,
               adds_to="k1"),),
@@ -84,7 +84,7 @@ TRANSMISSION: tuple[Effect, ...] = (
         "The transmission torque depends on the history of the deflection.",
         "transmission",
         "plant.spring:transmitted_torque",
-        "antiresonance damped",
+        Telltale("antiresonance damped", "deflection", "deflection rate"),
         "Dahl 1968 on the deflection; the rate-independent Bouc-Wen model with n = 1",
         (
             size("torque_nm", "N m", "Half height of the hysteresis loop"),
@@ -100,7 +100,7 @@ TRANSMISSION: tuple[Effect, ...] = (
         "The transmission has a viscous term.",
         "transmission",
         "plant.spring:transmitted_torque",
-        "resonance damped at mid and high amplitude",
+        Telltale("resonance damped at mid and high amplitude", "deflection rate"),
         "Spong 1987, ASME J. Dyn. Syst. 109(4), with joint damping",
         (size("nm_s_rad", "N m s/rad", "Torque per deflection velocity"),),
         ({"nm_s_rad": (0.005, 0.05)},),
@@ -112,7 +112,7 @@ TRANSMISSION: tuple[Effect, ...] = (
         "The gear transmits an angle that is off periodically with the motor angle.",
         "transmission",
         "plant.spring:deflection",
-        "even lines, flat with amplitude",
+        Telltale("even lines, flat with amplitude", "turn"),
         "Tuttle, Seering 1996, IEEE Trans. Robotics and Automation 12(3)",
         ripple("amplitude_rad", "rad", 1.0, "the angle error"),
         ripple_starts("amplitude_rad", 3e-3),
@@ -124,7 +124,7 @@ TRANSMISSION: tuple[Effect, ...] = (
         "A third mass hangs on the link behind a spring of its own.",
         "link",
         "plant.torques:link_drive",
-        "narrow band",
+        Telltale("narrow band", "frequency"),
         "three-mass model of a flexible joint with a flexible link",
         (
             size("inertia_kg_m2", "kg m2", "Inertia of the third mass", 0.0, 1e3),
@@ -148,7 +148,7 @@ TRANSMISSION: tuple[Effect, ...] = (
         "The link is out of balance.",
         "link",
         "plant.torques:link_drive",
-        "DC and even lines at low amplitude",
+        Telltale("DC and even lines at low amplitude", "position"),
         "pendulum torque m g l sin(q + angle)",
         (
             size("torque_nm", "N m", "Greatest gravity torque m g l"),
@@ -166,7 +166,7 @@ TRANSMISSION: tuple[Effect, ...] = (
         "A balancer or a hose pulls the link back as a spring to the frame does.",
         "link",
         "plant.torques:link_drive",
-        "slow motion stiffer at every amplitude",
+        Telltale("slow motion stiffer at every amplitude", "position"),
         "linear torsion spring to the ground (Hooke)",
         (
             size("stiffness_nm_rad", "N m/rad", "Stiffness between link and frame", 0.0, 1e9),
@@ -187,7 +187,9 @@ TRANSMISSION: tuple[Effect, ...] = (
         "A cable to the frame pulls the link back, and gives way while it does.",
         "link",
         "plant.torques:cable_pull",
-        "quick motion stiffer at every amplitude, slow motion and DC as without",
+        Telltale(
+            "quick motion stiffer at every amplitude, slow motion and DC as without", "frequency",
+        ),
         "Maxwell element to the ground, a spring behind a damper",
         (
             size("stiffness_nm_rad", "N m/rad", "Stiffness against quick motion", 0.0, 1e9),
@@ -205,7 +207,7 @@ TRANSMISSION: tuple[Effect, ...] = (
         "The transmission yields where the datasheet has it rigid.",
         "transmission",
         "plant.flexible_joint:with_added",
-        "resonance and antiresonance where an inertia alone has none",
+        Telltale("resonance and antiresonance where an inertia alone has none", "frequency"),
         "paper eqs. 2 and 3 with k1 = 0; Spong 1987, ASME J. Dyn. Syst. 109(4)",
         (
             size("compliance_rad_nm", "rad/N m", "Deflection per transmitted torque, 1/k0",

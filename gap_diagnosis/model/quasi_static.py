@@ -165,12 +165,14 @@ class QuasiStaticSimulator:
     Attributes:
         loop: of no run known.
         crossover_hz: up to which the torque is known along the motion.
+        speeds: of each run, float64 (stations,), rad/s.
     """
 
     def __init__(self, found: Stations) -> None:
         """Take the stations."""
         self._found, self._records = found, found.records.records
         self.loop = RecordLoop.unknown(len(self._records))
+        self.speeds = found.speeds
         self.crossover_hz = found.records.sample_rate_hz / 8.0
         torque = np.mean([np.mean(r.torque**2) for r in self._records])
         motion = np.mean([np.var(r.position) for r in self._records])
@@ -187,6 +189,11 @@ class QuasiStaticSimulator:
     def missing_torque(self, model: Model, which: Sequence[int]) -> list[np.ndarray]:
         """Return the torque that a model needs beyond the recorded one, N m."""
         return [self._needed(model, i) - self._records[i].torque for i in which]
+
+    def held(self, model: Model, which: Sequence[int]) -> list[np.ndarray]:
+        """Return y, u and q of a model along each recorded motion, see `RecordSimulator.held`."""
+        angles = [(self._records[i].position, self._needed(model, i)) for i in which]
+        return [np.array([angle, needed, angle]) for angle, needed in angles]
 
     def added_for(self, torque: np.ndarray, _: Model) -> np.ndarray:
         """Return a torque that a model lacks, which is seen as it is."""

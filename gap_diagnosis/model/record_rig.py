@@ -17,7 +17,7 @@ from controller_node.transfer_function import TransferFunction
 from fjr_kit.errors import InputError
 from fjr_records.record_noise import RecordNoise
 from fjr_records.records import RecordSet
-from fjr_sim_node.simulation.closed_loop import State
+from fjr_sim_node.simulation.closed_loop import State, Trajectory
 
 from .drive import Drive
 from .near_steady import begins
@@ -194,16 +194,25 @@ class RecordSimulator:
         Returns:
             float64 (samples,) for each run, N m; NaN where the motion diverges.
         """
-        return run_parallel(self._missing, [(model, index) for index in which])
+        runs = zip(self.held(model, which), which, strict=True)
+        return [run[1] - self.records.records[index].torque for run, index in runs]
 
-    def _missing(self, job: tuple[Model, int]) -> np.ndarray:
+    def held(self, model: Model, which: Sequence[int]) -> list[np.ndarray]:
+        """Return y, u and q of a model that an observer holds to each recorded motion.
+
+        Returns:
+            float64 (3, samples) for each run: rad, N m with what the observer adds, rad; NaN where
+            the motion diverges.
+        """
+        return run_parallel(self._held, [(model, index) for index in which])
+
+    def _held(self, job: tuple[Model, int]) -> np.ndarray:
         model, index = job
-        record = self.records.records[index]
         try:
             run = self._observed(index).simulated(self._rate, *self.coefficients(model))
-            return run.torque - record.torque
         except InputError:
-            return np.full(record.samples, np.nan)
+            return np.full((3, self.records.records[index].samples), np.nan)
+        return _signals(model, run)
 
     def added_for(self, torque: np.ndarray, model: Model) -> np.ndarray:
         """Return what that observer adds for a torque that a model lacks, (samples,), N m."""
@@ -249,7 +258,7 @@ class RecordSimulator:
             run = drive.simulated(self._rate, *self.coefficients(model), noise)
         except InputError:
             return np.full((3, self.records.records[index].samples), np.nan)
-        return np.array([run.position, run.torque, run.motor if model.rigid else run.link])
+        return _signals(model, run)
 
     def _one(self, job: tuple[Model, int]) -> np.ndarray:
         model, index = job
@@ -263,7 +272,7 @@ class RecordSimulator:
             run = drive.simulated(self._rate, *self.coefficients(model))
         except InputError:
             return np.full((3, samples), np.nan)
-        out = np.array([run.position, run.torque, run.motor if model.rigid else run.link])
+        out = _signals(model, run)
         if first:
             record = self.records.records[index]
             link = record.position if record.link is None else record.link
@@ -282,3 +291,7 @@ class RecordSimulator:
         """Tell whether a model would take so long to play as no record can call for."""
         samples = self.records.records[index].samples
         return too_stiff(model, samples, self._rate, self._speeds[index], self._torques[index])
+
+
+def _signals(model: Model, run: Trajectory) -> np.ndarray:
+    return np.array([run.position, run.torque, run.motor if model.rigid else run.link])

@@ -229,8 +229,17 @@ def _sets(diagnosis: Diagnosis) -> str:
 
 def summaries(diagnosis: Diagnosis) -> list[str]:
     """Return a sentence about each named effect, and each that may stand in its place."""
-    names = dict.fromkeys(name for members in diagnosis.equivalent for name in members)
-    return [f"{explanation([name])}: {fx.EFFECTS[name].summary}" for name in names]
+    return [f"{explanation([name])}: {fx.EFFECTS[name].summary}" for name in _named(diagnosis)]
+
+
+def summaries_with_telltales(diagnosis: Diagnosis) -> list[str]:
+    """Return the same with how each shows in the data."""
+    told = zip(summaries(diagnosis), _named(diagnosis), strict=True)
+    return [f"{what} Telltale: {fx.EFFECTS[name].telltale.words}." for what, name in told]
+
+
+def _named(diagnosis: Diagnosis) -> list[str]:
+    return list(dict.fromkeys(name for members in diagnosis.equivalent for name in members))
 
 
 def unit_of(name: str) -> str:

@@ -21,12 +21,13 @@ from .gap_plots import sigma_plot, torque_plot, where_plot
 from .gap_tables import distances, gap_table, gates, parameters, places, tried
 from .outcome_values import origin, outcome_plots, outcome_values
 from .run_plots import run_level_plots, tried_plot
+from .telltales import telltales
 
 Plots = dict[str, Any]
 _ABSENT: Mapping[str, Any] = {
     "fitted": False, "noise_known": False, "tried": [], "parameters": [], "method": "",
     "windows_s": "", "steady": False, "gates": [], "maps": False, "stages": 0, "repeatable": True,
-    "places": [], "distances": None,
+    "places": [], "distances": None, "telltales": [], "observer_hz": "",
 }  # fmt: skip
 """What the template shows of runs that were not fitted, and of records."""
 
@@ -60,6 +61,8 @@ def render_gap_report(
         by_level = [run_level_plots(one, known) for one in found]
         plot = tried_plot(diagnosis.ranking)
         overview |= {} if plot is None else {"tried": plot}
+        values["telltales"], shown = telltales(investigation)
+        overview |= shown
         values |= _fitted_values(investigation, fitted)
     if steady is not None:
         by_level, levels, shown = _steady_plots(steady, by_level, levels)
@@ -93,6 +96,7 @@ def _fitted_values(investigation: Investigation, fitted: Fitted) -> dict[str, An
         "tried": tried(diagnosis),
         "parameters": parameters(space, diagnosis, investigation.nominal.plant),
         "method": _method(fitted),
+        "observer_hz": "" if evidence.slow else f"{evidence.simulator.crossover_hz:.3g}",
         "windows_s": f"{2 * evidence.hop / evidence.records.sample_rate_hz:.3g}",
     }
 

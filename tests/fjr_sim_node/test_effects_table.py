@@ -105,7 +105,7 @@ ENTRY = """
         "Drag grows with the cube of velocity.",
         "motor",
         "plant.torques:motor_viscous",
-        "highest amplitude",
+        Telltale("highest amplitude", "velocity"),
         "a test of the table",
         (size("nm_s3_rad3", "N m s3/rad3", "Drag on the motor"),),
         ({"nm_s3_rad3": (0.05, 0.5)},),
@@ -131,7 +131,9 @@ from fjr_records.periodic import RecordedExperiment, RecordedRealization
 from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.model.steady_runs import steady_runs
 from gap_diagnosis.outcome.verdict_words import explanation, unit_of
+from gap_diagnosis.report.telltales import drawn
 from gap_diagnosis.which.catalogue import catalogue
+from gap_diagnosis.where.telltale import shown
 from gap_diagnosis.which.cell_fits import CellFitter
 
 name = "cubic_drag.nm_s3_rad3"
@@ -167,11 +169,13 @@ refit = fitter.refit()
 found = fitter.add(refit, "cubic_drag", fitter.screening(refit, "cubic_drag").proposals())
 assert abs(found.model.effects[name] / 2.0 - 1.0) < 0.02, found.model.effects
 assert fitter.gains(found, refit).sum() > 10.0
+plot = drawn(shown(fitter.evidence, "cubic_drag", found.model), "cubic_drag")
+assert plot["layout"]["xaxis"]["title"]["text"] == "motor velocity (rad/s)"
 """
 
 
 def test_a_new_effect_is_one_entry_and_its_law(tmp_path: Path) -> None:
-    """Node parameter, file, fit, document and words have it; it is found; exports refuse it."""
+    """Node parameter, file, fit, document and words have it; it is found and drawn; no export."""
     for package in PACKAGES:
         shutil.copytree(ROOT / package, tmp_path / package, ignore=shutil.ignore_patterns("__py*"))
     table = tmp_path / "fjr_sim_node/effects/friction.py"

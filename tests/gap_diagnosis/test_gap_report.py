@@ -20,6 +20,7 @@ from fjr_interface.parameter_file import load_parameter_file
 from fjr_kit.errors import InputError
 from fjr_kit.plots import BARRED
 from fjr_records.records import Record, RecordSet
+from fjr_sim_node.effects import EFFECTS
 from fjr_sim_node.plant import PLANT
 from gap_diagnosis.any_record import investigate
 from gap_diagnosis.how_far.bla_comparison import bla_distance_db, compare
@@ -160,6 +161,18 @@ def test_causes_and_evidence_are_said(page):
     text = " ".join(" ".join(page.texts).split())
     assert "backlash or piecewise stiffness 90%" in text
     assert "Steady periods were compared. The controller is known" in text
+
+
+def test_each_cause_is_shown_over_the_quantity_of_its_telltale(page, found):
+    text = " ".join(" ".join(page.texts).split())
+    for name in ("backlash", "piecewise_stiffness"):  # a cause and what is not told from it
+        assert EFFECTS[name].telltale.words in text
+    plot = page.data()["overview"]["telltale-backlash"]
+    assert "deflection" in plot["layout"]["xaxis"]["title"]["text"]
+    _, left, added, without = (np.array(trace["y"]) for trace in plot["data"])
+    deflection = np.array(plot["data"][2]["x"])
+    assert np.std(left) < 0.3 * np.std(without)
+    assert np.corrcoef(without, added)[0, 1] > 0.9 and np.corrcoef(added, deflection)[0, 1] < 0.0
 
 
 def test_the_page_asks_nothing_of_any_network(found):

@@ -25,6 +25,7 @@ from gap_diagnosis.model.rig_model import Model
 from gap_diagnosis.outcome.diagnosis import Diagnosis
 from gap_diagnosis.outcome.verdict_words import ROUNDING
 from gap_diagnosis.report.gap_report import compared, render_gap_report
+from gap_diagnosis.report.telltales import telltales
 from gap_diagnosis.report.updated_parameters import updated_values
 from gap_diagnosis.verdict.coarse_encoder import with_coarse_encoder
 from gap_diagnosis.which.rounding import (
@@ -111,6 +112,9 @@ def test_report_and_updated_parameters_hold_the_step(named):
     assert values["simulator"][STEP] == pytest.approx(COARSE, rel=1e-9)
     page = render_gap_report(named, compared(named), {})
     assert "encoder quantization" in page
+    [plot] = telltales(named)[1].values()
+    _, added, without = (np.array(trace["y"]) for trace in plot["data"])
+    assert 0.5 < np.median(added / without) < 1.5  # rounding is as large as what it explains
     schema = Diagnosis.model_validate_json(named.diagnosis.to_json())
     assert schema.effects == [ROUNDING]
 
