@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from .entry import (
+    CONSTANT_TORQUE,
     QUARTERS,
     Effect,
     EffectParameter,
@@ -37,7 +38,7 @@ DRIVE: tuple[Effect, ...] = (
         "drive offset",
         (size("torque_nm", "N m", "Constant torque", -1e4),),
         ({"torque_nm": (0.002,)},),
-        looks_like="constant torque",
+        looks_like=CONSTANT_TORQUE,
         load=Load(lambda q: [np.ones(q.size)], lambda sizes: {"torque_nm": sizes[0]}),
     ),
     Effect(
@@ -49,7 +50,7 @@ DRIVE: tuple[Effect, ...] = (
         "Petrovic et al. 2000, IEEE Trans. Control Systems Technology 8(6)",
         ripple("amplitude_nm", "N m", 1e4, "the torque ripple"),
         ripple_starts("amplitude_nm", 0.002),
-        looks_like="constant torque",
+        looks_like=CONSTANT_TORQUE,
         looks_like_held="ripple of the torque",
         ripple=True,
     ),

@@ -64,6 +64,12 @@ class Telltale:
     along: Along = ""
 
 
+CONSTANT_TORQUE = "constant torque"
+"""Family of near equivalents that follow laws of their own, of the angle or of direction, and look
+alike only where the motion is short: there may be two of them. The members of any other family
+differ by the form of one law."""
+
+
 @dataclass(frozen=True)
 class Load:
     """A torque on the joint that depends on nothing but the angle, linear in its sizes.
@@ -210,6 +216,11 @@ class Effect:
         """Full names of sizes and limits: the parameters that switch the effect off."""
         pairs = zip(self.names, self.parameters, strict=True)
         return tuple(name for name, p in pairs if p.role in ("size", "limit"))
+
+    @property
+    def by_its_own_law(self) -> bool:
+        """Whether its near equivalents follow other laws than it, see `CONSTANT_TORQUE`."""
+        return self.looks_like == CONSTANT_TORQUE
 
     @property
     def depends_on_others(self) -> bool:

@@ -7,7 +7,17 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from .entry import AtVelocity, Effect, EffectParameter, Start, Telltale, ripple, ripple_starts, size
+from .entry import (
+    CONSTANT_TORQUE,
+    AtVelocity,
+    Effect,
+    EffectParameter,
+    Start,
+    Telltale,
+    ripple,
+    ripple_starts,
+    size,
+)
 
 # A level above Coulomb friction bends the bare parameters so far that small ones promise nothing;
 # a great level that falls within a small velocity would only make the plant stiff.
@@ -136,7 +146,7 @@ FRICTION: tuple[Effect, ...] = (
             {"coulomb_nm": (0.002,), "viscous_nm_s_rad": (0.0,)},
             {"coulomb_nm": (0.0,), "viscous_nm_s_rad": (0.01,)},
         ),
-        looks_like="constant torque",
+        looks_like=CONSTANT_TORQUE,
         same_as="a torque bias while the motor slides, where only Coulomb friction differs",
         modifies="coulomb_friction",
     ),

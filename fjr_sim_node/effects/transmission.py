@@ -6,7 +6,17 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .entry import Effect, EffectParameter, Load, Telltale, angle, ripple, ripple_starts, size
+from .entry import (
+    CONSTANT_TORQUE,
+    Effect,
+    EffectParameter,
+    Load,
+    Telltale,
+    angle,
+    ripple,
+    ripple_starts,
+    size,
+)
 
 _MODES = tuple(np.geomspace(0.08, 2.0, 44).tolist())
 """Frequencies of a light third mass over the highest with signal: it shows in a band as narrow as
@@ -155,7 +165,7 @@ TRANSMISSION: tuple[Effect, ...] = (
             angle("angle_rad", "Angle of the link from hanging down at q = 0"),
         ),
         ({"torque_nm": (0.003, 0.03), "angle_rad": (0.0, np.pi / 2, np.pi)},),
-        looks_like="constant torque",
+        looks_like=CONSTANT_TORQUE,
         same_as="cogging of one cycle per turn, on a rigid axis",
         of_a_turn=True,
         load=Load(lambda q: [-np.sin(q), -np.cos(q)], _weight),
@@ -177,7 +187,7 @@ TRANSMISSION: tuple[Effect, ...] = (
             {"stiffness_nm_rad": (0.01, 0.1), "rest_rad": (0.0,)},
             {"stiffness_nm_rad": (0.01,), "rest_rad": (-3.0, 3.0)},
         ),
-        looks_like="constant torque",
+        looks_like=CONSTANT_TORQUE,
         load=Load(lambda q: [-q, np.ones(q.size)], _spring),
         rarer_than="gravity",
         axis="both",
@@ -197,7 +207,7 @@ TRANSMISSION: tuple[Effect, ...] = (
                             0.02, 1e4, fit=(0.2, 2000.0)),
         ),
         ({"stiffness_nm_rad": (0.01, 0.1), "relaxation_s": (0.6, 10.0)},),
-        looks_like="constant torque",
+        looks_like=CONSTANT_TORQUE,
         rarer_than="gravity",
         axis="both",
         settles_slowly=True,

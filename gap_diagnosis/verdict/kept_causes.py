@@ -252,14 +252,10 @@ def _twice(fitter: CellFitter, best: CellFit, tested: Sequence[Tested]) -> list[
     """Return the causes that close little beside a near equivalent which closes little as well.
 
     Little of what both close together; beside others, that may itself be little of the gap. What
-    closes nearly all of the rest is a cause of its own: a law of another form mends a part of it.
+    closes nearly all of the rest by a law of its own is there (`CONSTANT_TORQUE`).
     """
     found: set[str] = set()
-    little = {
-        t.effect: t
-        for t in tested
-        if t.share.value < _TWICE and not t.over_noise_closed > 1.0 - NEARLY_ALL
-    }
+    little = {t.effect: t for t in tested if t.share.value < _TWICE and not _closes_the_rest(t)}
     for effect, other in itertools.combinations(little, 2):
         if other not in fx.near_equivalents(effect):
             continue
@@ -269,6 +265,11 @@ def _twice(fitter: CellFitter, best: CellFit, tested: Sequence[Tested]) -> list[
         if max(others) - left < _TWICE * (1.0 - left):
             found |= {effect, other}
     return [t for t in tested if t.effect in found]
+
+
+def _closes_the_rest(tested: Tested) -> bool:
+    by_its_own_law = fx.EFFECTS[tested.effect].by_its_own_law
+    return by_its_own_law and tested.over_noise_closed > 1.0 - NEARLY_ALL
 
 
 def _guesses(tested: Sequence[Tested], lacking: Collection[str] = ()) -> list[Tested]:

@@ -58,7 +58,8 @@ class Extension:
         """
         names, nominal = self.effects, self._fitter.nominal
         twice = self._one_cause(parent, steps)
-        there = {*parent.effects, *tried, *(twice & self._part_or_whole(parent))}
+        of_one_law = {e for e in twice if not fx.EFFECTS[e].by_its_own_law}
+        there = {*parent.effects, *tried, *of_one_law}
         effects = [e for e in names if e not in there]
         effects = founded(effects, parent.effects, nominal, names)
         screened = self.screened(parent, effects)
@@ -91,7 +92,7 @@ class Extension:
         if not parent.effects and not self._fitter.evidence.slow and set(LACKED) & set(effects):
             self._progress("friction and load together")
             fits += self._fitter.together(parent, self.effects)
-        fits = [f for f in fits if f.effects[-1] not in twice or self._all_of_the_rest(f, parent)]
+        fits = [f for f in fits if f.effects[-1] not in twice or self._closes_the_rest(f, parent)]
         return Polish(self._fitter, self._progress).polished(self.ranked(fits, parent), parent)
 
     def _sticking(self, parent: CellFit, effects: Sequence[str]) -> CellFit | None:
@@ -197,17 +198,11 @@ class Extension:
         most = max(gains.values(), default=0.0)
         return [e for e in ordered if gains[e] >= _START_LESS * most]
 
-    def _part_or_whole(self, parent: CellFit) -> set[str]:
-        """Return what a cause of the parent holds as a limit case, or is held by."""
-        held = {part for cause in parent.effects for part in fx.EFFECTS[cause].contains}
-        holding = {e for e in self.effects if {*fx.EFFECTS[e].contains} & {*parent.effects}}
-        return held | holding
-
-    def _all_of_the_rest(self, fit: CellFit, parent: CellFit) -> bool:
+    def _closes_the_rest(self, fit: CellFit, parent: CellFit) -> bool:
         """Tell whether a fit closes nearly all of what its parent leaves over noise.
 
-        A near equivalent of a cause whose law has another form than the catalogue's mends a part of
-        that; only a cause of its own mends nearly all.
+        Where the law of the parent's cause is a little another one than the catalogue's, a near
+        equivalent mends a part of that; what mends nearly all is a cause of its own.
         """
         left, gap = self._fitter.misfit(fit) - 1.0, self._fitter.misfit(parent) - 1.0
         return left < NEARLY_ALL * gap

@@ -235,13 +235,13 @@ def test_of_near_equivalents_the_one_that_closes_little_beside_the_other_names_i
     found = next(t for t in tested if t.effect == "delay")
     much = found.share.model_copy(update={"value": 0.3})
     alone = replace(found.without, left=1.05 * best.left)  # either does nearly all
-    little = replace(found, share=replace_share(much), without=alone, over_noise_closed=0.5)
+    little = replace(found, share=replace_share(much), without=alone)
     delay, lag = (replace(little, effect=e) for e in ("delay", "actuator_lag"))
     assert _twice(fitter, best, [delay, lag]) == [delay, lag]
     assert _twice(fitter, best, [replace(delay, share=much), lag]) == []
-    # what closes nearly all of the rest is a cause of its own
-    own = [replace(t, over_noise_closed=0.95) for t in (delay, lag)]
-    assert _twice(fitter, best, own) == []
+    # what closes nearly all of the rest by a law of its own is there
+    of_one_law = [replace(t, over_noise_closed=0.95) for t in (delay, lag)]
+    assert _twice(fitter, best, of_one_law) == of_one_law
     # what is little of the gap is much of what both close
     assert _twice(fitter, best, [delay, replace(lag, without=found.without)]) == []
 
