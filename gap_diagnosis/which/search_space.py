@@ -6,6 +6,7 @@ The table of effects gives starts and bounds of fits relative to `Scales`, those
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -33,6 +34,7 @@ _LEAST_LINK = 0.4  # of its inertia that a third mass leaves it at a start
 
 _COARSE_CYCLES = 11
 _ANOTHER = 2.0
+_OTHERWISE = 0.2 * math.pi  # rad, of a ripple over the travel: a tenth of one more or less
 
 
 def farthest(tolerance: float, scale: float = _SCALE) -> float:
@@ -142,7 +144,8 @@ class Space:
         scales: of the record; None: effects have no bounds but their physical limits.
         known: names of base parameters that are not free.
         cycles: ripples per turn, by full parameter name, from which a fit goes no further than by
-            a factor of two, either way: beyond, a ripple would be another one.
+            a factor of two, nor by a tenth of a ripple over the travel, either way: beyond, a
+            ripple would be another one.
     """
 
     nominal: Mapping[str, float]
@@ -205,7 +208,9 @@ class Space:
             if self.scales is not None:
                 least, most = self.scales.bounds(name)
             if near := self.cycles.get(name):
-                least, most = max(least, near / _ANOTHER), min(most, near * _ANOTHER)
+                further = near + _OTHERWISE / self.scales.travel_rad if self.scales else math.inf
+                less = 2.0 * near - further
+                least, most = max(least, near / _ANOTHER, less), min(most, near * _ANOTHER, further)
             low.append(max(least / unit, -1e6))
             high.append(min(most / unit, 1e6))
         return np.array(low), np.array(high)
