@@ -151,9 +151,12 @@ def test_what_is_known_is_not_free_and_a_ripple_stays_the_one_that_it_was():
     nominal = {"jm": 0.2, "fsm": 0.0, "fvm": 0.0}
     start = {"cogging.amplitude_nm": 2.0, "cogging.cycles_per_turn": 40.0, "cogging.phase_rad": 0.0}
     free = space_for(nominal, start, PAPER_LIKE)
-    near = replace(free, known=("jm",), cycles={"cogging.cycles_per_turn": 40.0})
+    short, long = (replace(PAPER_LIKE, travel_rad=travel) for travel in (0.01, 0.1 * math.pi))
+    near = replace(free, known=("jm",), cycles={"cogging.cycles_per_turn": 40.0}, scales=short)
     at = 3 + free.effects.index("cogging.cycles_per_turn")
     low, high = near.bounds()
     assert low[0] == high[0] == 0.0 and free.bounds()[0][0] < 0.0 < free.bounds()[1][0]
     assert low[at] == pytest.approx(0.5) and high[at] == pytest.approx(2.0)
     assert free.bounds()[0][at] < 0.5 and free.bounds()[1][at] > 2.0
+    nearer = replace(near, scales=long).bounds()  # of two ripples no more than a tenth of one
+    assert [bound[at] for bound in nearer] == pytest.approx([0.95, 1.05])
