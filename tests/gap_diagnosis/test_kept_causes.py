@@ -10,6 +10,7 @@ import pytest
 from test_evidence import NOMINAL, SCATTER, records
 
 from gap_diagnosis.model.evidence import Evidence
+from gap_diagnosis.model.rig_model import Model
 from gap_diagnosis.outcome.diagnosis import LEAST_PRESENT, Estimate
 from gap_diagnosis.verdict import kept_causes as kept_causes_module
 from gap_diagnosis.verdict.kept_causes import (
@@ -26,12 +27,13 @@ from gap_diagnosis.verdict.kept_causes import (
     kept,
 )
 from gap_diagnosis.verdict.not_named import _bent, _changing, _kin
+from gap_diagnosis.verdict.notes import unusual
 from gap_diagnosis.verdict.tested_causes import causes_with_tests
 from gap_diagnosis.which import stepwise
 from gap_diagnosis.which.cell_fits import CellFitter
 from gap_diagnosis.which.found import Found
 from gap_diagnosis.which.gains import Gain, beside_others
-from gap_diagnosis.which.presence import beyond_zero
+from gap_diagnosis.which.presence import beyond_zero, over_usual
 
 BOTH = ("coulomb_friction", "viscous_friction")
 SURELY = Gain(30.0, 25.0, 1.0, 1e-5)
@@ -443,3 +445,14 @@ def test_what_passing_causes_modify_stays_where_the_datasheet_lacks_it(searched)
     assert _bases(without, [replace(base, certain=False), falls], names) == set()
     assert _bases(without, [base, replace(falls, certain=False)], names) == set()
     assert _bases(fitter, [base, falls], names) == set()  # whose datasheet has friction
+
+
+def test_a_size_beyond_what_machines_have_is_doubted_and_this_is_said(searched):
+    fitter, fits = searched
+    sure = max(causes_with_tests(fitter, fits[3], fits[0], SCATTER), key=lambda t: t.present)
+    assert sure.unusual == 0.0 and replace(sure, unusual=1.0).present == sure.present
+    assert replace(sure, unusual=3.0).present == pytest.approx(0.6 * sure.present, rel=0.02)
+    eccentric = Model(NOMINAL, {"encoder_eccentricity.amplitude_rad": -0.27})
+    assert over_usual(eccentric, "encoder_eccentricity") == pytest.approx(5.4)
+    assert "0.27 rad is more than machines have" in unusual(eccentric, "encoder_eccentricity")
+    assert over_usual(Model(NOMINAL, {"delay.time_s": 1.0}), "delay") == 0.0
