@@ -10,9 +10,9 @@ from rich.console import Console
 from fjr_kit.number_text import three_digits
 from fjr_kit.terminal import print_table
 from gap_diagnosis.outcome.cause_words import (
-    CHOICE,
     cause_name,
-    contenders_head,
+    choice_sentences,
+    contender_names,
     digits,
     evidence_sentences,
     percent,
@@ -35,7 +35,7 @@ from gap_diagnosis.outcome.verdict_words import (
 )
 
 RANKED = 5
-"""How many explanations the summary on the terminal shows."""
+"""How many explanations beside the chosen one the summary on the terminal shows."""
 
 
 def print_summary(diagnosis: Diagnosis, console: Console, out: Path, *, runs: bool = True) -> None:
@@ -68,7 +68,8 @@ def print_summary(diagnosis: Diagnosis, console: Console, out: Path, *, runs: bo
         _say(console, f"Evidence: {' '.join(evidence_sentences(diagnosis.evidence))}")
     if diagnosis.contenders and (diagnosis.effects or diagnosis.verdict == "unexplained"):
         print_table(console, *_contenders(diagnosis))
-        _say(console, CHOICE)
+        for sentence in choice_sentences(diagnosis):
+            _say(console, sentence)
     if diagnosis.next_experiment is not None:
         _say(console, f"Next experiment: {diagnosis.next_experiment.description}")
     for note in diagnosis.notes:
@@ -135,18 +136,23 @@ def _steps(diagnosis: Diagnosis) -> Content:
 
 def _contenders(diagnosis: Diagnosis) -> Content:
     """Return the explanations that the verdict chose among, the chosen one first."""
-    heads = [(contenders_head(diagnosis), ""), ("misfit/dof", "selecting"), ("gain", "nats"),
-             ("converged", "")]  # fmt: skip
+    heads = [
+        ("explanation", ""),
+        ("misfit/dof", "selecting data"),
+        ("gain", "nats"),
+        ("converged", ""),
+    ]
+    found = zip(contender_names(diagnosis), diagnosis.contenders, strict=True)
     rows = [
         [
-            explanation(c.effects) if c.effects else "refit",
+            name,
             three_digits(c.held_out_chi2),
             three_digits(c.gain) if place else "-",
             "yes" if c.converged else "no",
         ]
-        for place, c in enumerate(diagnosis.contenders[: 1 + RANKED])
+        for place, (name, c) in enumerate(found)
     ]
-    return heads, rows
+    return heads, rows[: 1 + RANKED]
 
 
 def _percent(value: float | None) -> str:

@@ -34,15 +34,12 @@ TORQUE = (
     "Inertia takes next to none of the torque, so no motion was simulated: the torque that a model "
     "needs along the recorded motion was compared with the recorded one."
 )
-CHOICE = (
-    "Misfit and gain (log-likelihood of a block over the first row) are of the data that select "
-    "among explanations, all figures above of those that report, which selected nothing."
-)
-"""What the numbers of the contenders are."""
 LEAST_PERCENT = 1e-3
 """A smaller share is shown as less than that: its digits mean nothing to a reader."""
 NO_SHARE = "none seen"
 """What stands for a share that may be zero or less."""
+_BETTER = 1.0
+"""Gain (nats) over the chosen explanation from which on another one is said to do better."""
 _MOST_DIGITS = 6
 _AS_NOISE = 1.5  # times what noise leaves: a remainder no greater than that has no look of its own
 
@@ -92,9 +89,33 @@ def place_words(place: Place) -> str:
     return f"level {place.level}, {band}{twist}{kind}{sigma}"
 
 
-def contenders_head(diagnosis: Diagnosis) -> str:
-    """Return what stands above the explanations that the verdict chose among."""
-    return "chosen, and instead of it" if diagnosis.effects else "refit, and tried beside it"
+def contender_names(diagnosis: Diagnosis) -> list[str]:
+    """Return the explanations that the verdict chose among, by what they have instead."""
+    if not diagnosis.contenders:
+        return []
+    chosen = diagnosis.contenders[0].effects
+    names = ["as named" if chosen else "refit"]
+    for other in diagnosis.contenders[1:]:
+        own = explanation([e for e in other.effects if e not in chosen])
+        gone = [e for e in chosen if e not in other.effects]
+        names.append(f"{own} for {explanation(gone)}" if gone else own)
+    return names
+
+
+def choice_sentences(diagnosis: Diagnosis) -> list[str]:
+    """Return what the numbers of these explanations are, and whether one does better."""
+    said = [
+        "Misfit and gain (log-likelihood of a block over the first row) are of the data that "
+        "select among explanations; the figures above are of other data."
+    ]
+    better = [c for c in diagnosis.contenders[1:] if (c.gain or 0.0) > _BETTER]
+    if better and diagnosis.effects:
+        names = ",".join(better[0].effects)
+        said.append(
+            "An explanation of the set predicts better than the one that is named and stands in "
+            f"updated.yaml: diagnose again with --effects {names}."
+        )
+    return said
 
 
 def cause_name(cause: Cause) -> str:

@@ -14,7 +14,14 @@ from fjr_sim_node import effects as fx
 
 from ..gates.gate_checks import GateReport
 from ..how_far.bla_comparison import LevelComparison, Response, bla_distance_db, bla_distance_sigma
-from ..outcome.cause_words import cause_name, digits, percent, place_words, share_words
+from ..outcome.cause_words import (
+    cause_name,
+    contender_names,
+    digits,
+    percent,
+    place_words,
+    share_words,
+)
 from ..outcome.diagnosis import Diagnosis, Estimate, Figure, Gap
 from ..outcome.verdict_words import explains, explanation, unit_of
 from ..which.search_space import Space
@@ -75,12 +82,12 @@ def contenders(diagnosis: Diagnosis) -> list[Row]:
         return []
     return [
         (
-            explanation(one.effects) if one.effects else "refit",
+            name,
             nan if one.held_out_chi2 is None else one.held_out_chi2,
             nan if one.gain is None else one.gain,
             _converged(one.converged),
         )
-        for one in diagnosis.contenders
+        for name, one in zip(contender_names(diagnosis), diagnosis.contenders, strict=True)
     ]
 
 

@@ -8,8 +8,7 @@ from typing import Any
 
 from ..model.rig_model import Model
 from ..outcome.cause_words import (
-    CHOICE,
-    contenders_head,
+    choice_sentences,
     evidence_sentences,
     remainder_sentences,
     share_sentences,
@@ -35,8 +34,7 @@ def outcome_values(diagnosis: Diagnosis) -> dict[str, Any]:
         "waterfall_px": height(diagnosis) if waterfall_plot(diagnosis) else 0,
         "causes": causes(diagnosis),
         "contenders": contenders(diagnosis),
-        "contenders_head": contenders_head(diagnosis),
-        "choice": CHOICE,
+        "choice": choice_sentences(diagnosis),
         "shares": share_sentences(diagnosis),
         "tested_causes": any(cause.where for cause in diagnosis.causes),
         "remainder": remainder_sentences(diagnosis),

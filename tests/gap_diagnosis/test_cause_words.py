@@ -6,10 +6,13 @@ import pytest
 
 from gap_diagnosis.outcome.cause_words import (
     NO_SHARE,
+    choice_sentences,
+    contender_names,
     share_sentences,
     share_words,
     tells,
 )
+from gap_diagnosis.outcome.contender import Contender
 from gap_diagnosis.outcome.diagnosis import Cause, Diagnosis, Figure, Gaps, Place, Step
 
 
@@ -67,6 +70,19 @@ def test_a_cause_that_closes_nothing_is_said_to_make_the_simulation_no_better():
     [said] = share_sentences(biased(0.884))
     assert "no part of the position's rms error, so the simulation is no better" in said
     assert "level 1, 0 to 2.6 Hz" in said
+
+
+def test_an_explanation_that_does_better_than_the_named_one_is_told_with_what_it_has_instead():
+    def contender(effects, gain):
+        return Contender(effects=effects, held_out_chi2=2.0, gain=gain, converged=True)
+
+    named = ["coulomb_friction", "torque_bias"]
+    for gain in (0.3, 16.0):
+        found = [contender(named, 0.0), contender(["torque_bias", "delay"], gain)]
+        told = biased(0.1).model_copy(update={"contenders": found})
+        assert contender_names(told) == ["as named", "delay for coulomb friction"]
+        better = [s for s in choice_sentences(told) if "--effects torque_bias,delay" in s]
+        assert len(better) == (gain > 1.0)
 
 
 def test_an_experiment_says_which_pairs_it_tells_apart_by_what_they_do_not_share():
