@@ -104,9 +104,10 @@ def contender_names(diagnosis: Diagnosis) -> list[str]:
 
 def choice_sentences(diagnosis: Diagnosis) -> list[str]:
     """Return what the numbers of these explanations are, and whether one does better."""
+    other = "" if diagnosis.reported_on == "none" else "; the figures above are of other data"
     said = [
         "Misfit and gain (log-likelihood of a block over the first row) are of the data that "
-        "select among explanations; the figures above are of other data."
+        f"select among explanations{other}."
     ]
     better = [c for c in diagnosis.contenders[1:] if (c.gain or 0.0) > _BETTER]
     if better and diagnosis.effects:
