@@ -11,18 +11,21 @@ from fjr_kit.number_text import three_digits
 from fjr_kit.terminal import print_table
 from gap_diagnosis.outcome.cause_words import (
     cause_name,
+    choice_sentences,
+    contender_names,
     digits,
     evidence_sentences,
     percent,
     remainder_sentences,
+    share_sentences,
     share_words,
 )
 from gap_diagnosis.outcome.diagnosis import Diagnosis
 from gap_diagnosis.outcome.verdict_words import (
     HELD_OUT,
-    WORDS,
     action,
     closed,
+    doubt,
     explanation,
     headline,
     is_better,
@@ -32,7 +35,7 @@ from gap_diagnosis.outcome.verdict_words import (
 )
 
 RANKED = 5
-"""How many explanations the summary on the terminal shows."""
+"""How many explanations beside the chosen one the summary on the terminal shows."""
 
 
 def print_summary(diagnosis: Diagnosis, console: Console, out: Path, *, runs: bool = True) -> None:
@@ -51,6 +54,8 @@ def print_summary(diagnosis: Diagnosis, console: Console, out: Path, *, runs: bo
         _say(console, sentence)
     if diagnosis.causes:
         print_table(console, *_causes(diagnosis))
+        for sentence in share_sentences(diagnosis):
+            _say(console, sentence)
     if diagnosis.effects:
         print_table(console, *_parameters(diagnosis), left=("unit",))
     if diagnosis.steps:
@@ -61,13 +66,15 @@ def print_summary(diagnosis: Diagnosis, console: Console, out: Path, *, runs: bo
         _say(console, f"Remainder: {' '.join(sentences)}")
     if diagnosis.evidence is not None:
         _say(console, f"Evidence: {' '.join(evidence_sentences(diagnosis.evidence))}")
-    if _by_misfit(diagnosis) and diagnosis.verdict in ("ambiguous", "unexplained"):
-        print_table(console, *_ranking(diagnosis))
+    if diagnosis.contenders and (diagnosis.effects or diagnosis.verdict == "unexplained"):
+        print_table(console, *_contenders(diagnosis))
+        for sentence in choice_sentences(diagnosis):
+            _say(console, sentence)
     if diagnosis.next_experiment is not None:
         _say(console, f"Next experiment: {diagnosis.next_experiment.description}")
     for note in diagnosis.notes:
         _say(console, f"Note: {note}")
-    _say(console, f"When not to believe it: {WORDS[diagnosis.verdict].doubt}")
+    _say(console, f"When not to believe it: {doubt(diagnosis)}")
     if diagnosis.parameters and is_better(diagnosis):
         place = f"{shlex.quote(str(out))}/updated.yaml"
         if runs:
@@ -127,19 +134,25 @@ def _steps(diagnosis: Diagnosis) -> Content:
     return heads, rows
 
 
-def _by_misfit(diagnosis: Diagnosis) -> bool:
-    """Tell whether explanations are ranked by their misfit, as those of steady periods are."""
-    return any(candidate.held_out_chi2 is not None for candidate in diagnosis.ranking)
-
-
-def _ranking(diagnosis: Diagnosis) -> Content:
-    misfit = f"{HELD_OUT[diagnosis.reported_on]} misfit/dof"
-    heads = [("explanation", ""), (misfit, ""), ("converged", "")]
-    rows = [
-        [explanation(c.effects), three_digits(c.held_out_chi2), "yes" if c.converged else "no"]
-        for c in diagnosis.ranking[:RANKED]
+def _contenders(diagnosis: Diagnosis) -> Content:
+    """Return the explanations that the verdict chose among, the chosen one first."""
+    heads = [
+        ("explanation", ""),
+        ("misfit/dof", "selecting data"),
+        ("gain", "nats"),
+        ("converged", ""),
     ]
-    return heads, rows
+    found = zip(contender_names(diagnosis), diagnosis.contenders, strict=True)
+    rows = [
+        [
+            name,
+            three_digits(c.held_out_chi2),
+            three_digits(c.gain) if place else "-",
+            "yes" if c.converged else "no",
+        ]
+        for place, (name, c) in enumerate(found)
+    ]
+    return heads, rows[: 1 + RANKED]
 
 
 def _percent(value: float | None) -> str:

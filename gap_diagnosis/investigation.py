@@ -27,6 +27,7 @@ from .model.steady_runs import SteadyRuns
 from .outcome.diagnosis import LEAST_PRESENT, Bags, Diagnosis
 from .outcome.verdict_words import BACKWARDS, LOST, ROUNDING
 from .verdict.coarse_encoder import with_coarse_encoder
+from .verdict.contenders import contenders
 from .verdict.judgement import driven_backwards, judge, reproduced
 from .verdict.kept_causes import kept
 from .verdict.notes import of_fit, of_records, yielding
@@ -202,9 +203,11 @@ def investigate_runs(
     progress("judgement")
     notes = [*records.notes, *cut, *heard, *of_records(evidence, nominal), *of_fit(found)]
     diagnosis = judge(fitter, model, found, tested, alternatives, bags, scatter, notes)
+    rivals = tuple(fit for fits in tied.values() for fit in fits)
+    chosen_of = {"contenders": contenders(fitter, found, rivals)}
+    diagnosis = diagnosis.model_copy(update=chosen_of)
     if order.effects is None or ROUNDING in order.effects:
         fitter, found, diagnosis = with_coarse_encoder(fitter, model, found, diagnosis)
-    rivals = tuple(fit for fits in tied.values() for fit in fits)
     return Investigation(records, model, diagnosis, Fitted(fitter, found, tuple(tested), rivals))
 
 

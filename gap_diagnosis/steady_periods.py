@@ -84,7 +84,7 @@ def _swinging(view: SteadyView, nominal: Model, order: Order) -> Investigation:
     that the recorded torque must drive the model. It stays bad data where nothing is found, or
     where the loop with what was found cannot be simulated any better.
     """
-    whole = investigate_runs(view.recorded.as_records(), order)
+    whole = _whole(view.recorded, order)
     if whole.diagnosis.causes and whole.fitted is not None:
         error = discretisation_error(view.recorded, whole.fitted.found.best.model.smooth)
         if np.max(error) <= DISCRETISATION_LIMIT:
@@ -122,15 +122,19 @@ def _beside_whole(found: Investigation, whole: Investigation) -> Investigation:
 
 def _beside_drift(recorded: RecordedExperiment, order: Order) -> Investigation:
     """Diagnose whole runs, a drift of friction being one of the causes if it goes with time."""
-    runs = recorded.as_records()
-    whole = investigate_runs(runs, replace(order, drift=True))
+    whole = _whole(recorded, replace(order, drift=True))
     if whole.fitted is None:
         return whole
     evidence = whole.fitted.evidence
     without = [t.without for t in whole.fitted.tested if t.effect == DRIFT]
     if all(friction_follows_time(evidence, fit.variance, fit.model) for fit in without):
         return whole
-    return investigate_runs(runs, order)
+    return _whole(recorded, order)
+
+
+def _whole(recorded: RecordedExperiment, order: Order) -> Investigation:
+    """Diagnose whole runs; they stay those of an experiment, whose grid and levels are known."""
+    return replace(investigate_runs(recorded.as_records(), order), recorded=recorded)
 
 
 def _viewed(found: Investigation, view: SteadyView, order: Order) -> Investigation:

@@ -24,6 +24,7 @@ from fjr_sim_node.simulation.closed_loop import simulate
 
 from ..model.rig_model import Model
 from ..model.simulated_rig import last_samples, run_parallel
+from ..outcome.cause_words import tells
 from ..outcome.diagnosis import NextExperiment
 from ..which.comparison import CellFit
 from .trials import Trial, trials
@@ -78,10 +79,10 @@ def next_experiment(
     if not told:
         return None
     names = [" + ".join(fit.effects) or "parameters" for fit in rivals]
-    left = [f"{names[a]} from {names[b]}" for a, b in sigmas if (a, b) not in told]
+    apart = [fit.effects for fit in rivals]
     return NextExperiment(
         kind=best.kind,
-        description=best.description + (f" It will not tell {', '.join(left)}." if left else ""),
+        description=f"{best.description} {tells([*sigmas], told, apart)}",
         separates=[name for i, name in enumerate(names) if any(i in pair for pair in told)],
         predicted_sigma=min(sigmas[pair] for pair in told),
         rig_time_s=bench.rig_time_s(best),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from fjr_kit.number_text import unsigned_zero
 
@@ -35,6 +36,10 @@ TORQUE = (
 )
 LEAST_PERCENT = 1e-3
 """A smaller share is shown as less than that: its digits mean nothing to a reader."""
+NO_SHARE = "none seen"
+"""What stands for a share that may be zero or less."""
+_BETTER = 1.0
+"""Gain (nats) over the chosen explanation from which on another one is said to do better."""
 _MOST_DIGITS = 6
 _AS_NOISE = 1.5  # times what noise leaves: a remainder no greater than that has no look of its own
 
@@ -84,18 +89,112 @@ def place_words(place: Place) -> str:
     return f"level {place.level}, {band}{twist}{kind}{sigma}"
 
 
+def contender_names(diagnosis: Diagnosis) -> list[str]:
+    """Return the explanations that the verdict chose among, by what they have instead."""
+    if not diagnosis.contenders:
+        return []
+    chosen = diagnosis.contenders[0].effects
+    names = ["as named" if chosen else "refit"]
+    for other in diagnosis.contenders[1:]:
+        own = explanation([e for e in other.effects if e not in chosen])
+        gone = [e for e in chosen if e not in other.effects]
+        names.append(f"{own} for {explanation(gone)}" if gone else own)
+    return names
+
+
+def choice_sentences(diagnosis: Diagnosis) -> list[str]:
+    """Return what the numbers of these explanations are, and whether one does better."""
+    other = "" if diagnosis.reported_on == "none" else "; the figures above are of other data"
+    said = [
+        "Misfit and gain (log-likelihood of a block over the first row) are of the data that "
+        f"select among explanations{other}."
+    ]
+    better = [c for c in diagnosis.contenders[1:] if (c.gain or 0.0) > _BETTER]
+    if better and diagnosis.effects:
+        names = ",".join(better[0].effects)
+        said.append(
+            "An explanation of the set predicts better than the one that is named and stands in "
+            f"updated.yaml: diagnose again with --effects {names}."
+        )
+    return said
+
+
 def cause_name(cause: Cause) -> str:
     """Return a cause with what cannot be told from it, such as 'gravity or torque bias'."""
     return " or ".join(explanation([name]) for name in (cause.effect, *cause.others))
 
 
 def share_words(figure: Figure | None) -> str:
-    """Return a share with its interval, in percent; a dash where there is none."""
+    """Return a share with its interval, in percent; a dash where there is none.
+
+    A share that does not differ from nothing is said to be none: its digits mean nothing.
+    """
     if figure is None or not known(figure.value):
         return "-"
+    if not closes(figure):
+        return NO_SHARE
     if figure.low is None or figure.high is None:
         return percent(figure.value)
-    return f"{percent(figure.value)} ({100 * figure.low:.0f} to {percent(figure.high)})"
+    return f"{percent(figure.value)} ({percent(figure.low)[:-1]} to {percent(figure.high)})"
+
+
+def closes(share: Figure) -> bool:
+    """Tell whether a share of the gap lies above zero, its interval too."""
+    return (share.value if share.low is None else min(share.value, share.low)) > 0.0
+
+
+def share_sentences(diagnosis: Diagnosis) -> list[str]:
+    """Return what each cause does that closes no share of the gap: to the torque, or to nothing.
+
+    A loop that integrates takes a constant torque away from the position; its torque shows it.
+    """
+    shares = [(cause, cause.share) for cause in diagnosis.causes]
+    return [
+        f"{cause_name(cause)}: {_beside_share(cause, diagnosis)}"
+        for cause, share in shares
+        if share is not None and not closes(share)
+    ]
+
+
+def _beside_share(cause: Cause, diagnosis: Diagnosis) -> str:
+    of = "position" if diagnosis.compared == "motion" else "torque"
+    added = [step.added for step in diagnosis.steps]
+    at = added.index(cause.effect) if cause.effect in added else 0
+    if at and of == "position":
+        before, after = (diagnosis.steps[i].nrmse_torque for i in (at - 1, at))
+        falls = before is not None and after is not None and after < before
+        if falls and percent(after) != percent(before):
+            return (
+                "no share of the position's error is seen to go with it; the torque's error falls "
+                f"from {percent(before)} to {percent(after)} by it."
+            )
+    where = "; ".join(map(place_words, cause.where))
+    shows = f"it shows at {where} only" if where else "only tests of single bands show it"
+    return f"it closes no part of the {of}'s rms error, so the simulation is no better; {shows}."
+
+
+def tells(
+    pairs: Sequence[tuple[int, int]],
+    told: Sequence[tuple[int, int]],
+    explanations: Sequence[Sequence[str]],
+) -> str:
+    """Return which explanations an experiment tells apart, and which not.
+
+    Args:
+        pairs: of explanations, by their places.
+        told: those that it tells apart.
+        explanations: effects of each; those that all of them have are not said.
+    """
+    common = set.intersection(*map(set, explanations))
+    own = [[e for e in effects if e not in common] or [*effects] for effects in explanations]
+    names = [explanation(effects) for effects in own]
+    left = [pair for pair in pairs if pair not in told]
+    said = (("It will tell", told), ("It will not tell", left))
+    return " ".join(
+        f"{begins} {', '.join(f'{names[a]} from {names[b]}' for a, b in chosen)}."
+        for begins, chosen in said
+        if chosen
+    )
 
 
 def percent(ratio: float | None) -> str:

@@ -8,6 +8,8 @@ from pydantic import Field
 
 from fjr_kit.result_types import Document, FreeForm, Number, OptionalNumber, ResultModel, Unit
 
+from .contender import Contender
+
 Verdict = Literal[
     "no_gap",
     "parameters_only",
@@ -229,7 +231,16 @@ class EvidenceKind(ResultModel):
 
 
 class Candidate(ResultModel):
-    """One explanation that was fitted."""
+    """One explanation that the search tried.
+
+    Attributes:
+        effects: in the order in which they were added.
+        held_out_chi2: misfit on the data that select, which are not those of `steps`.
+        delta: log-likelihood that it gains on a block of these data over the step of one effect
+            less, nats.
+        converged: whether the fit did.
+        parameters: of the effects.
+    """
 
     effects: list[str]
     held_out_chi2: OptionalNumber
@@ -279,7 +290,10 @@ class Diagnosis(Document):
         gap_figures: the gap with intervals; None where nothing was simulated.
         bags: what changes from bag to bag; None where that cannot be tested.
         where: the places of the gap, strongest first.
-        ranking: all explanations that were fitted, best first.
+        contenders: the chosen explanation, then those in which another member of a set stands in
+            place of its cause, the best first; where no cause is named, the refit and what was
+            tried beside it. Empty where there was nothing to choose.
+        ranking: what the search tried, in the order of its steps.
         parameters: base parameters and effect parameters of the best explanation.
         next_experiment: what to do where the set stays ambiguous.
         notes: sentences that a reader must see.
@@ -300,6 +314,7 @@ class Diagnosis(Document):
     gap_figures: GapFigures | None = None
     bags: Bags | None = None
     where: list[Place] = Field(default_factory=list)
+    contenders: list[Contender] = Field(default_factory=list)
     ranking: list[Candidate] = Field(default_factory=list)
     parameters: dict[str, Estimate] = Field(default_factory=dict)
     next_experiment: NextExperiment | None = None

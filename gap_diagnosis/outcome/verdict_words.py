@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from fjr_sim_node import effects as fx
@@ -40,10 +41,26 @@ _NO_EXPERIMENT = (
     "No experiment was found that would tell them apart within the recorded torques; updated.yaml "
     "holds the first."
 )
+_NOT_SEARCHED = (
+    "No experiment that would tell them apart was looked for: that is done for steady periods of "
+    "a known loop only. Of an experiment that you plan, fjr plan --effects {members} says which "
+    "of them it would not tell apart. Until then updated.yaml holds the first."
+)
 _WORSE = (
     "Use the nominal parameters as they are: those of updated.yaml, which were fitted, come no "
     "nearer to the rig{on}. Longer or stronger records may mend the fit."
 )
+_MIXED = (
+    "Choose by what counts for you: than the nominal parameters the fitted ones, in updated.yaml, "
+    "come nearer to the rig{on} by {nearer}, but are farther off by {farther}."
+)
+_OF_A_GATE: tuple[Verdict, ...] = ("bad_data", "nonstationary")
+_LOOK = (
+    "Look at where the gap lies below. Check mounting, encoder and logging before looking for a "
+    "law of friction."
+)
+_ALIKE = 1.01
+"""Ratio of two errors, or misfits, of which neither counts as greater."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +84,8 @@ WORDS: dict[Verdict, Words] = {
     "no_gap": Words(
         "No gap",
         "Rig and nominal simulation agree within the noise at all levels.",
-        "Use the nominal parameters as they are.",
+        "Use the nominal parameters as they are: updated.yaml holds the refit, which noise does "
+        "not tell from them.",
         "Loud noise hides small effects: look at the noise floor. Amplitudes and frequencies that "
         "were not played are not covered.",
     ),
@@ -92,7 +110,8 @@ WORDS: dict[Verdict, Words] = {
         "An effect is missing, several explain it",
         "After the refit a gap remained; the explanations of the set close it equally well on "
         "these data.",
-        "Run the next experiment to tell them apart; until then updated.yaml holds the first.",
+        "Run the next experiment, which says what it tells apart; until then updated.yaml holds "
+        "the first.",
         "The true one is in the set only if it is in the catalogue. Outside the recorded "
         "amplitudes and band the members of the set part.",
     ),
@@ -108,10 +127,8 @@ WORDS: dict[Verdict, Words] = {
     "unexplained": Words(
         "Unexplained",
         "A gap remains after the refit, and no explanation of the catalogue closes it.",
-        "Look at where it lies below; updated.yaml holds the refit. "
-        "Check mounting, encoder and logging before looking for a law of friction.",
-        "More than two effects at once, or fits that did not converge (see the ranking), can end "
-        "here too.",
+        f"updated.yaml holds the refit. {_LOOK}",
+        "{more} can end here too.",
     ),
     "nonstationary": Words(
         "The rig changes while it is recorded",
@@ -151,27 +168,66 @@ def meaning(diagnosis: Diagnosis) -> str:
 
 def action(diagnosis: Diagnosis) -> str:
     """Return what to do next."""
-    if diagnosis.verdict != "no_gap" and not is_better(diagnosis):
-        return _WORSE.format(on=ON[diagnosis.reported_on])
-    if diagnosis.verdict == "ambiguous" and diagnosis.next_experiment is None:
-        return _NO_EXPERIMENT
-    return WORDS[diagnosis.verdict].action
+    verdict, on = diagnosis.verdict, ON[diagnosis.reported_on]
+    if verdict == "no_gap" or verdict in _OF_A_GATE:
+        return WORDS[verdict].action
+    nearer, farther = changes(diagnosis)
+    if farther or not nearer:
+        either = _MIXED if nearer else _WORSE
+        told = either.format(nearer=" and ".join(nearer), farther=" and ".join(farther), on=on)
+        return f"{told} {_LOOK}" if verdict == "unexplained" else told
+    if verdict == "ambiguous" and diagnosis.next_experiment is None:
+        members = [name for names in diagnosis.equivalent if len(names) > 1 for name in names]
+        return (_NO_EXPERIMENT if _searched(diagnosis) else _NOT_SEARCHED).format(
+            members=",".join(members)
+        )
+    return WORDS[verdict].action
+
+
+def doubt(diagnosis: Diagnosis) -> str:
+    """Return when not to believe the verdict."""
+    more = "More than two effects at once"
+    if not all(candidate.converged for candidate in diagnosis.ranking):
+        more += ", or fits that did not converge (see what was tried),"
+    return WORDS[diagnosis.verdict].doubt.format(more=more)
+
+
+def _searched(diagnosis: Diagnosis) -> bool:
+    """Tell whether an experiment was looked for that separates what is tied."""
+    found = diagnosis.evidence
+    return found is None or (found.excitation == "periodic" and found.controller != "unknown")
 
 
 def is_better(diagnosis: Diagnosis) -> bool:
     """Tell whether updated.yaml comes nearer to the rig than the nominal parameters.
 
-    It does not if both its error and its misfit are as large or larger.
+    It does if of its error and its misfit one is less and none is greater. Noise does not tell it
+    from them where there is no gap.
+    """
+    nearer, farther = changes(diagnosis)
+    return diagnosis.verdict != "no_gap" and bool(nearer) and not farther
+
+
+def changes(diagnosis: Diagnosis) -> tuple[list[str], list[str]]:
+    """Return by which figures updated.yaml is nearer to the rig than the nominal, and farther.
+
+    A simulation that diverges is farther than any other.
     """
     before, after = diagnosis.gap.nominal, diagnosis.gap.explained or diagnosis.gap.refit
-    if before is None or after is None:
-        return before is None
-    pairs = [
-        (diagnosis.missed(before), diagnosis.missed(after)),
-        (before.chi2_per_dof, after.chi2_per_dof),
-    ]
-    known = [(old, new) for old, new in pairs if old is not None and new is not None]
-    return not known or any(new < old for old, new in known)
+    what = "position" if diagnosis.compared == "motion" else "torque"
+    names = f"the error of the {what}", "the misfit"
+    if before is None:
+        return [*names], []
+    olds, news = (
+        [math.inf if figure is None else figure for figure in ends]
+        for ends in (
+            (diagnosis.missed(before), before.chi2_per_dof),
+            (diagnosis.missed(after), None if after is None else after.chi2_per_dof),
+        )
+    )
+    ends = [*zip(names, olds, news, strict=True)]
+    nearer = [name for name, old, new in ends if new < old]
+    return nearer, [name for name, old, new in ends if new > _ALIKE * old]
 
 
 def closed(diagnosis: Diagnosis) -> str:

@@ -10,14 +10,23 @@ import numpy as np
 
 from bla_analyzer.results.summary import mean_level_db
 from fjr_kit.page import Cell, Column, Mark, Row
+from fjr_sim_node import effects as fx
 
 from ..gates.gate_checks import GateReport
 from ..how_far.bla_comparison import LevelComparison, Response, bla_distance_db, bla_distance_sigma
-from ..outcome.cause_words import cause_name, digits, percent, place_words, share_words
+from ..outcome.cause_words import (
+    cause_name,
+    contender_names,
+    digits,
+    percent,
+    place_words,
+    share_words,
+)
 from ..outcome.diagnosis import Diagnosis, Estimate, Figure, Gap
 from ..outcome.verdict_words import explains, explanation, unit_of
 from ..which.search_space import Space
 from .gap_level_plots import MODEL_STYLES
+from .updated_parameters import simulator_values
 
 MOST_PLACES = 12
 MOST_ACTS = 3
@@ -67,6 +76,21 @@ def causes(diagnosis: Diagnosis) -> list[Row]:
     ]
 
 
+def contenders(diagnosis: Diagnosis) -> list[Row]:
+    """Return the explanations that the verdict chose among: name, misfit, gain, convergence."""
+    if not diagnosis.effects and diagnosis.verdict != "unexplained":
+        return []
+    return [
+        (
+            name,
+            nan if one.held_out_chi2 is None else one.held_out_chi2,
+            nan if one.gain is None else one.gain,
+            _converged(one.converged),
+        )
+        for name, one in zip(contender_names(diagnosis), diagnosis.contenders, strict=True)
+    ]
+
+
 def tried(diagnosis: Diagnosis) -> list[Row]:
     """Return each effect that was tried beside the causes before it: step, effect, gain, values."""
     return [
@@ -82,15 +106,28 @@ def tried(diagnosis: Diagnosis) -> list[Row]:
 
 
 def parameters(space: Space, diagnosis: Diagnosis, nominal: Mapping[str, float]) -> list[Row]:
-    """Return name, unit, nominal value, estimate, interval, change (%) of what is shown."""
+    """Return name, unit, nominal value, estimate, interval, change (%) of what is shown.
+
+    After these what `updated.yaml` has, where that is another value or stands at another name.
+    """
     bounds = _bounds(space)
+    written = simulator_values({name: e.value for name, e in diagnosis.parameters.items()})
     rows: list[Row] = []
     for name, e in diagnosis.parameters.items():
         given = nominal.get(name, nan)
         change = 100.0 * (e.value / given - 1.0) if given else nan
         note: Cell = Mark("at its bound", "fail") if _at(e.value, bounds.get(name)) else ""
-        rows.append((name, unit_of(name), given, *digits(e), change, note))
+        rows.append(
+            (name, unit_of(name), given, *digits(e), change, _written(name, e, written), note)
+        )
     return rows
+
+
+def _written(name: str, estimate: Estimate, written: Mapping[str, float]) -> str:
+    """Return the value of updated.yaml, or where it holds the parameter; empty if as shown."""
+    if name in written:
+        return "" if written[name] == estimate.value else f"{written[name]:.5g}"
+    return f"in {fx.parameter(name).adds_to or 'the parameters above'}"
 
 
 def _bounds(space: Space) -> Mapping[str, tuple[float, float]]:

@@ -7,10 +7,15 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..model.rig_model import Model
-from ..outcome.cause_words import evidence_sentences, remainder_sentences
+from ..outcome.cause_words import (
+    choice_sentences,
+    evidence_sentences,
+    remainder_sentences,
+    share_sentences,
+)
 from ..outcome.diagnosis import Diagnosis
-from ..outcome.verdict_words import HELD_OUT, WORDS, action, closed, headline, meaning, summaries
-from .gap_tables import causes
+from ..outcome.verdict_words import HELD_OUT, action, closed, doubt, headline, meaning, summaries
+from .gap_tables import causes, contenders
 from .waterfall import height, waterfall_plot
 
 
@@ -23,11 +28,14 @@ def outcome_values(diagnosis: Diagnosis) -> dict[str, Any]:
         "meaning": meaning(diagnosis),
         "closed": closed(diagnosis),
         "action": action(diagnosis),
-        "doubt": WORDS[diagnosis.verdict].doubt,
+        "doubt": doubt(diagnosis),
         "summaries": summaries(diagnosis),
         "data": HELD_OUT[diagnosis.reported_on],
         "waterfall_px": height(diagnosis) if waterfall_plot(diagnosis) else 0,
         "causes": causes(diagnosis),
+        "contenders": contenders(diagnosis),
+        "choice": choice_sentences(diagnosis),
+        "shares": share_sentences(diagnosis),
         "tested_causes": any(cause.where for cause in diagnosis.causes),
         "remainder": remainder_sentences(diagnosis),
         "evidence": evidence_sentences(diagnosis.evidence) if diagnosis.evidence else [],

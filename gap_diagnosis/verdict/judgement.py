@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -40,7 +41,9 @@ from .notes import SCALED, beyond_tolerance
 from .tested_causes import Tested
 
 PLAIN = 4.0
-"""Misfit below which the refit alone explains the gap, where no effect gains anything."""
+"""Misfit below which the refit alone explains the gap, where no effect gains anything..."""
+MOST_LEFT = 0.5
+"""...and noise explains what it leaves, or it leaves less of the gap over noise than this."""
 FORM = 0.01
 """Of the gap over noise, and of the motion: what the form of a right law may leave."""
 WITHOUT_CAUSE: dict[Verdict, float] = {
@@ -232,9 +235,24 @@ def verdict_of(
     if known and not thin:
         if steps[0].chi2_per_dof is not None and steps[0].chi2_per_dof < NOTHING_LEFT:
             return "no_gap"
-        if steps[1].chi2_per_dof is not None and steps[1].chi2_per_dof < PLAIN:
+        if parameters_explain(steps[0].chi2_per_dof, steps[1].chi2_per_dof):
             return "parameters_only"
     return "unexplained"
+
+
+def parameters_explain(nominal: float | None, refit: float | None) -> bool:
+    """Tell whether a refit explains the gap of a datasheet that leaves more than noise.
+
+    A small misfit is no proof of that: the datasheet's may be smaller.
+
+    Args:
+        nominal: misfit of the datasheet; None where its simulation diverges.
+        refit: misfit of the refit.
+    """
+    if refit is None or refit >= PLAIN:
+        return False
+    gap = math.inf if nominal is None else nominal - 1.0
+    return refit < NOTHING_LEFT or refit - 1.0 < MOST_LEFT * gap
 
 
 def _nothing_left(refit: Step, best: Step) -> bool:

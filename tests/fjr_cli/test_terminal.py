@@ -14,8 +14,8 @@ from fjr_bringup.replay.comparison import Difference
 from fjr_bringup.replay.publishing import Published, PublishedTopic
 from fjr_cli import analysis_summary, diagnosis_summary
 from fjr_cli.replay_summary import print_differences, print_published
+from gap_diagnosis.outcome.contender import Contender
 from gap_diagnosis.outcome.diagnosis import (
-    Candidate,
     Cause,
     Diagnosis,
     Estimate,
@@ -64,9 +64,8 @@ def test_diagnose_cuts_no_number_and_says_the_share_as_a_sentence(console):
     effects = ["piecewise_stiffness", "backlash"]
     figure = Figure(value=0.987, low=0.981, high=0.993)
     stage = StageFigures(nominal=None, refit=None, explained=None, noise_floor=None, closed=figure)
-    ranked = Candidate(
-        effects=effects, held_out_chi2=123.4, delta=1.0, converged=True, parameters={}
-    )
+    chosen = Contender(effects=effects, held_out_chi2=123.4, gain=0.0, converged=True)
+    other = Contender(effects=["delay"], held_out_chi2=125.6, gain=-0.0123, converged=False)
     gap = Gaps(
         nominal=Gap(nrmse_position=0.2345, nrmse_torque=0.3456, chi2_per_dof=2.91e4),
         refit=Gap(nrmse_position=0.0567, nrmse_torque=0.0678, chi2_per_dof=1.91e3),
@@ -94,13 +93,13 @@ def test_diagnose_cuts_no_number_and_says_the_share_as_a_sentence(console):
         gap=gap,
         gap_closed=0.987,
         gap_figures=GapFigures(position=stage, torque=stage, bla_sigma=stage, distortion_db=stage),
-        ranking=[ranked],
+        contenders=[chosen, other],
         parameters={name: Estimate(value=0.6543, low=0.6521, high=0.6565) for name in names},
     )
     diagnosis_summary.print_summary(diagnosis, console, Path("out"))
     text = printed(console)
     words = text.split()
-    for number in ("23.4", "34.6", "2.91e+04", "0.123", "0.0681", "0.662", "123"):
+    for number in ("23.4", "34.6", "2.91e+04", "0.123", "0.0681", "0.662", "123", "126", "-0.0123"):
         assert number in words, number
     for name in (*names, "0.6543", "0.6521", "0.6565"):
         assert name in text

@@ -17,6 +17,8 @@ from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.model.nominal import datasheet
 from gap_diagnosis.model.record_rig import _NOTHING
 from gap_diagnosis.model.rig_model import Model
+from gap_diagnosis.outcome.diagnosis import Diagnosis, Estimate, Gaps
+from gap_diagnosis.report.gap_tables import parameters
 from gap_diagnosis.which.cell_fits import CellFitter
 from gap_diagnosis.which.found import Found
 from gap_diagnosis.which.stepwise import Stepwise
@@ -89,3 +91,18 @@ def test_friction_that_is_lacked_is_fitted_whatever_its_start_promises(fitter):
     assert fitter.add(refit, "coulomb_friction", dear) is not None
     bias = fitter.screening(refit, "torque_bias").proposals()
     assert fitter.add(refit, "torque_bias", [(c + 1e6, s, p) for c, s, p in bias]) is None
+
+
+def test_the_report_says_where_updated_yaml_holds_a_friction_that_the_datasheet_lacks(fitter):
+    refit = fitter.refit()
+    fit = fitter.add(refit, BOTH[0], fitter.screening(refit, BOTH[0]).proposals())
+    nothing = Gaps(nominal=None, refit=None, explained=None, noise_floor=None)
+    found = {
+        n: Estimate(value=v, low=v, high=v)
+        for n, v in {**fit.model.plant, **fit.model.effects}.items()
+    }
+    told = Diagnosis(verdict="effect", confidence=0.9, gap=nothing, parameters=found)
+    rows = {row[0]: row for row in parameters(fit.space, told, fitter.nominal)}
+    size = fit.model.effects["coulomb_friction.motor_nm"]
+    assert rows["coulomb_friction.motor_nm"][-2] == "in fsm"
+    assert rows["fsm"][-2] == f"{size:.5g}" and rows["jm"][-2] == ""

@@ -62,6 +62,12 @@ def test_a_rig_with_backlash_is_named_and_its_gap_closed(backlash):
     ranked = {tuple(candidate.effects): candidate for candidate in diagnosis.ranking}
     half_gap = ranked[("backlash",)].parameters["backlash.half_gap_rad"]
     assert half_gap.value == pytest.approx(HALF_GAP_RAD, rel=0.05)
+    if len(diagnosis.equivalent[0]) > 1:
+        chosen, *others = diagnosis.contenders
+        assert chosen.effects == diagnosis.effects and chosen.gain == 0.0
+        assert [one.effects[-1] for one in others] == diagnosis.equivalent[0][1:]
+        assert all(one.gain < 1.0 and one.held_out_chi2 < 2.0 for one in others)
+        assert all(f"{one.effects[-1].replace('_', ' ')} for " in text for one in others)
     assert diagnosis.gap_closed > 0.9
     assert 0.9 < diagnosis.causes[0].share.low <= diagnosis.causes[0].share.high <= 1.0
     assert diagnosis.gap.explained.nrmse_position < 2 * diagnosis.gap.noise_floor.nrmse_position

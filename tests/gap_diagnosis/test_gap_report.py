@@ -247,7 +247,7 @@ def test_diagnosis_json_has_the_fields_of_its_schema_and_no_other(found):
     assert list(text) == [
         "schema", "verdict", "effects", "equivalent", "confidence", "evidence", "causes", "steps",
         "remainder", "gap", "gap_closed", "gap_figures", "bags", "where",
-        "ranking", "parameters", "next_experiment", "notes",
+        "contenders", "ranking", "parameters", "next_experiment", "notes",
     ]  # fmt: skip
     assert text["schema"] == "fjr_rig/diagnosis/2"
     assert set(text["gap"]) == {"nominal", "refit", "explained", "noise_floor"}

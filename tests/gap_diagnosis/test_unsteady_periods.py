@@ -26,6 +26,7 @@ from gap_diagnosis.model.rig_model import Model
 from gap_diagnosis.model.steady_runs import steady_runs
 from gap_diagnosis.outcome.diagnosis import Diagnosis
 from gap_diagnosis.report.gap_output import write_diagnosis
+from gap_diagnosis.report.updated_parameters import updated_values
 from gap_diagnosis.steady_periods import NOTHING_NAMED, UNSTEADY
 from gap_diagnosis.which.cell_fits import DRIFT, CellFitter
 from gap_diagnosis.which.gains import gain
@@ -79,6 +80,10 @@ def test_a_cause_is_named_beside_a_drift_within_each_run():
     assert any("drifts within bags" in note for note in diagnosis.notes)
     size = diagnosis.causes[0].parameters["actuator_lag.time_constant_s"]
     assert size.value == pytest.approx(LAG_S, rel=0.1)
+    played = updated_values(found.recorded, diagnosis)["excitation"]
+    assert played["amplitudes_rad"] == pytest.approx(SHORT["levels_rad"])
+    assert (played["grid"], played["realizations"], played["periods"]) == ("odd_random", 3, 2)
+    assert played["base_frequency_hz"] == SHORT["base_frequency_hz"]
 
 
 def test_a_drift_beside_which_nothing_is_found_stays_the_verdict():
