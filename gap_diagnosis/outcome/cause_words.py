@@ -39,7 +39,7 @@ LEAST_PERCENT = 1e-3
 NO_SHARE = "none seen"
 """What stands for a share that may be zero or less."""
 _BETTER = 1.0
-"""Gain (nats) over the chosen explanation from which on another one is said to do better."""
+"""Gain (nats) over the chosen explanation above which one of no greater misfit does better."""
 _MOST_DIGITS = 6
 _AS_NOISE = 1.5  # times what noise leaves: a remainder no greater than that has no look of its own
 
@@ -109,7 +109,13 @@ def choice_sentences(diagnosis: Diagnosis) -> list[str]:
         "Misfit and gain (log-likelihood of a block over the first row) are of the data that "
         f"select among explanations{other}."
     ]
-    better = [c for c in diagnosis.contenders[1:] if (c.gain or 0.0) > _BETTER]
+    better = [
+        other
+        for chosen in diagnosis.contenders[:1]
+        for other in diagnosis.contenders[1:]
+        if (other.gain or 0.0) > _BETTER
+        and (other.held_out_chi2 or 0.0) <= (chosen.held_out_chi2 or math.inf)
+    ]
     if better and diagnosis.effects:
         names = ",".join(better[0].effects)
         said.append(

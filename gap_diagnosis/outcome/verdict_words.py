@@ -108,8 +108,8 @@ WORDS: dict[Verdict, Words] = {
     ),
     "ambiguous": Words(
         "An effect is missing, several explain it",
-        "After the refit a gap remained; the explanations of the set close it equally well on "
-        "these data.",
+        "After the refit a gap remained; each explanation of the set closes it, and these data "
+        "rule none of them out.",
         "Run the next experiment, which says what it tells apart; until then updated.yaml holds "
         "the first.",
         "The true one is in the set only if it is in the catalogue. Outside the recorded "

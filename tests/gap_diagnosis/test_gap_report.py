@@ -25,6 +25,7 @@ from fjr_sim_node.plant import PLANT
 from gap_diagnosis.any_record import investigate
 from gap_diagnosis.how_far.bla_comparison import bla_distance_db, compare
 from gap_diagnosis.investigation import Investigation
+from gap_diagnosis.outcome.contender import Contender
 from gap_diagnosis.outcome.diagnosis import Diagnosis, NextExperiment
 from gap_diagnosis.outcome.verdict_words import WORDS
 from gap_diagnosis.report.gap_output import write_diagnosis
@@ -51,6 +52,10 @@ def found() -> Investigation:
             made.diagnosis.causes[0].model_copy(
                 update={"others": ["piecewise_stiffness"], "present": 0.9}
             )
+        ],
+        "contenders": [
+            Contender(effects=[name], held_out_chi2=0.802, gain=gain, converged=True)
+            for name, gain in (("backlash", 0.0), ("piecewise_stiffness", -0.0123))
         ],
         "next_experiment": NextExperiment(
             kind="amplitude",
@@ -173,6 +178,13 @@ def test_each_cause_is_shown_over_the_quantity_of_its_telltale(page, found):
     deflection = np.array(plot["data"][2]["x"])
     assert np.std(left) < 0.3 * np.std(without)
     assert np.corrcoef(without, added)[0, 1] > 0.9 and np.corrcoef(added, deflection)[0, 1] < 0.0
+
+
+def test_the_explanations_of_a_set_stand_beside_each_other_on_the_data_that_select(page):
+    text = " ".join(" ".join(page.texts).split())
+    named = "as named 0.802 0 converged"
+    assert f"{named} piecewise stiffness for backlash 0.802 \N{MINUS SIGN}0.0123" in text
+    assert "of the data that select among explanations; the figures above are of other" in text
 
 
 def test_the_page_asks_nothing_of_any_network(found):
