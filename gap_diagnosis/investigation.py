@@ -37,6 +37,7 @@ from .which.cell_fits import DRIFT, CellFitter
 from .which.comparison import NOTHING_LEFT, CellFit
 from .which.equivalents import founded, partners
 from .which.estimates import moved_by_scatter, relative_scatter
+from .which.exchange import with_the_better_one
 from .which.found import Found
 from .which.gains import gain, stands_for
 from .which.rounding import beside_rounding
@@ -191,14 +192,19 @@ def investigate_runs(
     bags, scatter, said = _run_scatter(fitter, found.best)
     heard += said
     found, tested = kept(fitter, found, scatter, progress, names, until)
+    progress("what may stand in for a cause")
+    tied = _rivals(fitter, found, tested, names)
+    if (anew := with_the_better_one(found, tied, fitter)) and time.monotonic() < until:
+        progress(f"search with {anew.best.effects[-1]}")
+        anew = _stepwise(fitter, names, progress, until).go_on(anew)
+        found, tested = kept(fitter, anew, scatter, progress, names, until)
+        tied = _rivals(fitter, found, tested, names)
     backwards = driven_backwards(evidence)
     lost = reproduced(fitter, found.best) < LEAST_PRESENT
     if backwards or ((tested or not names) and lost):
-        found, tested = replace(found, steps=found.steps[:1]), []
+        found, tested, tied = replace(found, steps=found.steps[:1]), [], {}
         heard.append(BACKWARDS if backwards else LOST)
     heard += yielding([t.effect for t in tested], fitter.misfit(found.best))
-    progress("what may stand in for a cause")
-    tied = {t.effect: _tied(fitter, found, t, names) for t in tested}
     alternatives = {effect: [fit.effects[-1] for fit in fits] for effect, fits in tied.items()}
     progress("judgement")
     notes = [*records.notes, *cut, *heard, *of_records(evidence, nominal), *of_fit(found)]
@@ -260,6 +266,13 @@ def _run_scatter(
     said = [f"What scatters from run to run: {seen}."] if seen else []
     drift = "" if isinstance(fitter.evidence.records, SteadyRuns) else drift_of_runs(bags)
     return bags, relative_scatter(bags), [*said, *([drift] if drift else [])]
+
+
+def _rivals(
+    fitter: CellFitter, found: Found, tested: Sequence[Tested], names: Sequence[str]
+) -> dict[str, list[CellFit]]:
+    """Return, for each cause, fits in which another effect does as well in its place."""
+    return {t.effect: _tied(fitter, found, t, names) for t in tested}
 
 
 def _tied(fitter: CellFitter, found: Found, tested: Tested, names: Sequence[str]) -> list[CellFit]:

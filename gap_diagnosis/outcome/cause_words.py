@@ -176,7 +176,7 @@ def _beside_share(cause: Cause, diagnosis: Diagnosis) -> str:
             )
     where = "; ".join(map(place_words, cause.where))
     shows = f"it shows at {where} only" if where else "only tests of single bands show it"
-    return f"it closes no part of the {of}'s rms error, so the simulation is no better; {shows}."
+    return f"it closes no part of the {of}'s rms error on these runs; {shows}."
 
 
 def tells(

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
 from .cell_fits import CellFitter
+from .comparison import CellFit
 from .extension import Extension
 from .found import Found
-from .gains import stands_for
+from .gains import gain, stands_for
 from .presence import at_its_bound
 
 _FEWEST = 3
@@ -61,3 +65,28 @@ def drop_hindering(found: Found, fitter: CellFitter, extension: Extension) -> No
         before = [fit for fit in found.steps if not {effect, last} & {*fit.effects}]
         found.alternatives[other.effects[-1]] = extension.tied(other, fits, rest)
         found.steps[:] = [*before, rest, other]
+
+
+def with_the_better_one(
+    found: Found, tied: Mapping[str, Sequence[CellFit]], fitter: CellFitter
+) -> Found | None:
+    """Return what was found with another effect in the place of a cause that it surely outdoes.
+
+    A near equivalent that lost when the cause was chosen may do better beside all the others.
+
+    Args:
+        found: what the search has found and the tests have kept.
+        tied: for each cause, fits with another effect in its place.
+        fitter: that made all fits.
+    """
+    best = found.best
+    gains = [
+        (gain(fitter, fit, best), effect, fit) for effect, fits in tied.items() for fit in fits
+    ]
+    surely = [one for one in gains if one[0].present]
+    if not surely:
+        return None
+    _, effect, fit = max(surely, key=lambda one: one[0].mean)
+    steps = [step for step in found.steps if effect not in step.effects]
+    alternatives = {**found.alternatives, fit.effects[-1]: [effect]}
+    return replace(found, steps=[*steps, fit], alternatives=alternatives)

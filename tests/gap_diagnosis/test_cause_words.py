@@ -68,7 +68,7 @@ def test_a_cause_without_a_share_tells_what_it_does_to_the_torque():
 
 def test_a_cause_that_closes_nothing_is_said_to_make_the_simulation_no_better():
     [said] = share_sentences(biased(0.884))
-    assert "no part of the position's rms error, so the simulation is no better" in said
+    assert "no part of the position's rms error on these runs" in said
     assert "level 1, 0 to 2.6 Hz" in said
 
 

@@ -9,7 +9,7 @@ from test_evidence import NOMINAL, records
 
 from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.which.cell_fits import CellFitter
-from gap_diagnosis.which.exchange import drop_hindering
+from gap_diagnosis.which.exchange import drop_hindering, with_the_better_one
 from gap_diagnosis.which.extension import Extension
 from gap_diagnosis.which.found import Found
 from gap_diagnosis.which.stepwise import LEAST_CLOSED, Stepwise
@@ -76,3 +76,14 @@ def test_a_search_whose_time_is_up_before_pairs_are_tried_is_not_complete(fitted
     monkeypatch.setattr(search.extension, "extended", lambda *_: [half])
     found = Found([fits[0], fits[1]])
     assert not search._step(found) and not found.complete
+
+
+def test_what_does_surely_better_in_the_place_of_a_cause_takes_it(fitted):
+    fitter, fits = fitted
+    rival = replace(fits[3], effects=("stribeck_friction_motor", "torque_bias"))
+    worse = replace(fits[2], left=2.0 * fits[2].left)
+    found = with_the_better_one(Found(fits[:3]), {"delay": [worse, rival]}, fitter)
+    assert found is not None and found.best is rival
+    assert [fit.effects for fit in found.steps] == [(), ("stribeck_friction_motor",), rival.effects]
+    assert found.alternatives == {"torque_bias": ["delay"]}
+    assert with_the_better_one(Found(fits[:3]), {"delay": [worse, fits[2]]}, fitter) is None
