@@ -16,6 +16,7 @@ from gap_diagnosis.outcome.cause_words import (
     percent,
     remainder_sentences,
     share_words,
+    summaries,
 )
 from gap_diagnosis.outcome.diagnosis import Diagnosis
 from gap_diagnosis.outcome.verdict_words import (
@@ -27,7 +28,6 @@ from gap_diagnosis.outcome.verdict_words import (
     headline,
     is_better,
     meaning,
-    summaries,
     unit_of,
 )
 
@@ -93,7 +93,7 @@ def _parameters(diagnosis: Diagnosis) -> Content:
     """Return the parameters of the named effects with their 95 % intervals."""
     heads = [("parameter", ""), ("value", ""), ("95 % interval", ""), ("unit", "")]
     rows = [
-        [name, value, f"{low} to {high}", unit_of(name)]
+        [name, value, f"{low} to {high}", unit_of(name, linear=diagnosis.linear)]
         for name, e in diagnosis.parameters.items()
         if "." in name
         for value, low, high in [digits(e)]

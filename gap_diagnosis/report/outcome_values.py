@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..model.rig_model import Model
-from ..outcome.cause_words import evidence_sentences, remainder_sentences
+from ..outcome.cause_words import evidence_sentences, remainder_sentences, summaries
 from ..outcome.diagnosis import Diagnosis
-from ..outcome.verdict_words import HELD_OUT, WORDS, action, closed, headline, meaning, summaries
+from ..outcome.verdict_words import HELD_OUT, WORDS, action, closed, headline, meaning
 from .gap_tables import causes
 from .waterfall import height, waterfall_plot
 
