@@ -77,7 +77,7 @@ def print_summary(diagnosis: Diagnosis, console: Console, out: Path, *, runs: bo
                 console,
                 f"Better simulation: {place}. It holds no controller, since the recorded one is "
                 "unknown or no pd_filtered law: add yours before fjr simulate, or take the joint "
-                "elsewhere by fjr export.",
+                f"elsewhere by fjr export{' --linear' if diagnosis.linear else ''}.",
             )
 
 

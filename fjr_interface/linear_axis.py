@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 
-_ROTARY = re.compile(r"(?<=/)\(N m\)|\bN m(?=[\s/;,.)\]]|$)|\bkg m2\b|\brad(?=\d*\b)")
+_ROTARY = re.compile(r"(?<=/)\(N m\)|\bN m\b|\bkg m2\b|\brad(?=\d*\b)")
 _LINEAR = {"(N m)": "N", "N m": "N", "kg m2": "kg", "rad": "m"}
 PER_TURN = "per 2 pi m"
 """Unit of what is counted per turn: a turn is 2 pi m of a linear axis."""
