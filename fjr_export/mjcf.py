@@ -1,9 +1,9 @@
 """The joint as a MuJoCo model: two bodies that a tendon couples, and actuators for what MuJoCo has.
 
 The motor's inertia is the armature of its joint, the link's that of its body; where they slide,
-along x, each is the mass of its body. Both joints stand in one parent, so their angles and frictions are absolute, as
-th and q are; the tendon's length is q - th. What is periodic in an angle, bristles and hysteresis
-are passive DC motors.
+along x, each is the mass of its body. Both joints stand in one parent, so their angles and
+frictions are absolute, as th and q are; the tendon's length is q - th. What is periodic in an
+angle, bristles and hysteresis are passive DC motors.
 """
 
 from __future__ import annotations

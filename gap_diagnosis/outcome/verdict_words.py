@@ -226,7 +226,7 @@ def _sets(diagnosis: Diagnosis) -> str:
     )
 
 
-def unit_of(name: str, *, linear: bool) -> str:
+def unit_of(name: str, *, linear: bool = False) -> str:
     """Return the unit of a base parameter or of an effect's parameter on such an axis."""
     parameter = SIMULATOR[name]
     return (parameter.of_linear_axis() if linear else parameter).unit

@@ -37,8 +37,9 @@ simulator:
 """
 _RUNS = "95 % of runs of this rig lie within, as far as the laws of updated.yaml are the rig's."
 _FIT = (
-    "They hold what the fit does not know, but not 95 % of runs: how far the rig scatters from\n"
-    "# run to run is not known, since the runs are too few or differ by more than scatter explains."
+    "They hold what the fit does not know, but runs may lie beyond them: how far the rig\n"
+    "# scatters from run to run is not known, since the runs are too few or differ by more than\n"
+    "# scatter explains."
 )
 
 
