@@ -19,6 +19,7 @@ from gap_diagnosis.outcome.cause_words import (
     remainder_sentences,
     share_sentences,
     share_words,
+    summaries_with_telltales,
 )
 from gap_diagnosis.outcome.diagnosis import Diagnosis
 from gap_diagnosis.outcome.verdict_words import (
@@ -30,7 +31,6 @@ from gap_diagnosis.outcome.verdict_words import (
     headline,
     is_better,
     meaning,
-    summaries_with_telltales,
     unit_of,
 )
 
@@ -84,7 +84,7 @@ def print_summary(diagnosis: Diagnosis, console: Console, out: Path, *, runs: bo
                 console,
                 f"Better simulation: {place}. It holds no controller, since the recorded one is "
                 "unknown or no pd_filtered law: add yours before fjr simulate, or take the joint "
-                "elsewhere by fjr export.",
+                f"elsewhere by fjr export{' --linear' if diagnosis.linear else ''}.",
             )
 
 
@@ -100,7 +100,7 @@ def _parameters(diagnosis: Diagnosis) -> Content:
     """Return the parameters of the named effects with their 95 % intervals."""
     heads = [("parameter", ""), ("value", ""), ("95 % interval", ""), ("unit", "")]
     rows = [
-        [name, value, f"{low} to {high}", unit_of(name)]
+        [name, value, f"{low} to {high}", unit_of(name, linear=diagnosis.linear)]
         for name, e in diagnosis.parameters.items()
         if "." in name
         for value, low, high in [digits(e)]

@@ -50,6 +50,14 @@ def export(
         ),
     ] = None,
     without: Annotated[list[str] | None, effect_names("Effects to leave out.")] = None,
+    linear: Annotated[
+        bool,
+        typer.Option(
+            "--linear",
+            help="The axis is linear: write a joint that slides, with m, N and kg. "
+            "Bags of --replay say so themselves.",
+        ),
+    ] = False,
     signal_map: MapSignals = None,
 ) -> None:
     """Export the joint to a simulator or control tool, and replay recorded runs in it."""
@@ -68,6 +76,7 @@ def export(
             to.value,  # type: ignore[arg-type]
             place,
             without=[name for name in names_in(without) or [] if name],
+            linear=linear,
             replay=replay,
             signal_map=sources,
             progress=progress.describe,

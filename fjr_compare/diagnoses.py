@@ -8,6 +8,7 @@ from scipy.stats import norm
 
 from fjr_sim_node.simulation.simulator import SIMULATOR
 from gap_diagnosis.outcome.diagnosis import Diagnosis, Gap
+from gap_diagnosis.outcome.verdict_words import unit_of
 from gap_diagnosis.which.estimates import run_scatter
 
 from .result import CauseDifference, Pair, ParameterDifference
@@ -73,7 +74,7 @@ def _parameter(name: str, first: Diagnosis, other: Diagnosis) -> ParameterDiffer
     p = 2.0 * float(norm.sf(abs(change) / std)) if std > 0.0 else None
     return ParameterDifference(
         name=name,
-        unit=SIMULATOR[name].unit if name in SIMULATOR else "",
+        unit=unit_of(name, linear=first.linear) if name in SIMULATOR else "",
         first=one,
         other=two,
         scatter_percent=max(known) if known else None,

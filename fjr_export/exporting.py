@@ -6,6 +6,7 @@ from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from fjr_interface.bags.reader import LINEAR_AXIS
 from fjr_interface.bags.signals import DEFAULT, SignalMap
 from fjr_kit.atomic import result_folder
 from fjr_kit.telling import Progress
@@ -41,6 +42,7 @@ def export(
     out: Path | str,
     *,
     without: Collection[str] = (),
+    linear: bool = False,
     replay: Path | None = None,
     signal_map: SignalMap = DEFAULT,
     progress: Progress = lambda _: None,
@@ -52,6 +54,7 @@ def export(
         target: the tool.
         out: folder of the file and of `export.json`; files of an earlier export are replaced.
         without: effects to leave out.
+        linear: whether the joint slides; of replayed bags that say so it does in any case.
         replay: bags, or the diagnosis beside them, whose held-out runs are played; None for none.
         signal_map: which topics and fields of the bags are the signals.
         progress: told what is done.
@@ -60,13 +63,15 @@ def export(
         InputError: a bad file, an effect that the target cannot express, a target that must play
             and is not installed, bad bags, or `out` cannot be written.
     """
-    joint = read_joint(source, without)
+    joint = read_joint(source, without, linear=linear)
     refuse_inexpressible(joint, target)
     runs: list[Run] = []
     if replay is not None:
         progress("reading bags")
         records = read_runs(replay, signal_map)
-        joint = replace(joint, sample_rate_hz=records.sample_rate_hz)
+        joint = replace(
+            joint, sample_rate_hz=records.sample_rate_hz, linear=linear or records.linear
+        )
         runs = runs_of(joint, records)
     made = _MAKERS[target](joint, runs)
     player = made.target() if runs and made.target else None
@@ -167,6 +172,8 @@ def _told(joint: Joint, target: Target) -> Iterator[EffectExport]:
 def _notes(
     joint: Joint, target: Target, runs: Collection[Run], player: Stepped | None
 ) -> Iterator[str]:
+    if joint.linear and target in ("control", "simscape-m"):
+        yield LINEAR_AXIS
     if joint.has_encoder_noise:
         yield "The encoder noise of the parameter file is not exported."
     if target == "simscape-m":

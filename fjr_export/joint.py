@@ -9,6 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from fjr_interface.linear_axis import as_linear
 from fjr_interface.parameter_file import load_parameter_file
 from fjr_kit.errors import InputError
 from fjr_sim_node import effects, plant
@@ -26,12 +27,19 @@ class Joint:
         sample_rate_hz: rate at which the joint is commanded.
         source: the file that it comes from.
         without: effects that the export leaves out.
+        linear: whether it slides: its values are in m, N and kg where a joint that turns has rad,
+            N m and kg m2.
     """
 
     values: Mapping[str, Any]
     sample_rate_hz: float
     source: str
     without: frozenset[str] = frozenset()
+    linear: bool = False
+
+    def in_units(self, text: str) -> str:
+        """Return a text with units of a joint that turns in those of this one."""
+        return as_linear(text) if self.linear else text
 
     @property
     def title(self) -> str:
@@ -88,12 +96,13 @@ class Joint:
         return any(self.exported[name] != SIMULATOR[name].default for name in effect.size_names)
 
 
-def read_joint(path: Path | str, without: Collection[str] = ()) -> Joint:
+def read_joint(path: Path | str, without: Collection[str] = (), *, linear: bool = False) -> Joint:
     """Read the joint of a parameter file, such as the `updated.yaml` of a diagnosis.
 
     Args:
         path: ROS parameter file with values below /rig/simulator; others have their defaults.
         without: identifiers of effects to leave out.
+        linear: whether it slides, see `Joint`.
 
     Raises:
         InputError: no such file, no simulator in it, an unknown name, a value out of range, a link
@@ -112,4 +121,4 @@ def read_joint(path: Path | str, without: Collection[str] = ()) -> Joint:
             f"{path}: j is infinite, a link that is held; give the inertia j (kg m2) of the link "
             "that the joint is to move."
         )
-    return Joint(values, float(values["sample_rate_hz"]), str(path), frozenset(without))
+    return Joint(values, float(values["sample_rate_hz"]), str(path), frozenset(without), linear)

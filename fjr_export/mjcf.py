@@ -1,8 +1,9 @@
 """The joint as a MuJoCo model: two bodies that a tendon couples, and actuators for what MuJoCo has.
 
-The motor's inertia is the armature of its joint, the link's that of its body. Both joints stand in
-one parent, so their angles and frictions are absolute, as th and q are; the tendon's length is
-q - th. What is periodic in an angle, bristles and hysteresis are passive DC motors.
+The motor's inertia is the armature of its joint, the link's that of its body; where they slide,
+along x, each is the mass of its body. Both joints stand in one parent, so their angles and
+frictions are absolute, as th and q are; the tendon's length is q - th. What is periodic in an
+angle, bristles and hysteresis are passive DC motors.
 """
 
 from __future__ import annotations
@@ -112,27 +113,29 @@ class _Builder:
         self, parent: ET.Element, name: str, inertia: float, side: dict, armature: bool = False
     ) -> None:
         body = ET.SubElement(parent, "body", name=name)
-        own = inertia * (_LIGHT if armature else 1.0)
-        mass = 1e-3 if armature else 1.0
+        slides = self.joint.linear
+        own = inertia * (_LIGHT if armature and not slides else 1.0)
+        mass = own if slides else 1e-3 if armature else 1.0
         ET.SubElement(
             body, "inertial", pos="0 0 0", mass=_text(mass), diaginertia=_text(own, own, own)
         )
-        hinge = ET.SubElement(body, "joint", name=name, type="hinge", axis="0 0 1")
-        if armature:
-            hinge.set("armature", _text(inertia - own))
+        kind, axis = ("slide", "1 0 0") if slides else ("hinge", "0 0 1")
+        moving = ET.SubElement(body, "joint", name=name, type=kind, axis=axis)
+        if own < inertia:
+            moving.set("armature", _text(inertia - own))
         drag = self.joint.of("quadratic_friction")
         square = drag.get(f"{name}_nm_s2_rad2", 0.0)
-        hinge.set("damping", _text(side["damping"], square) if square else _text(side["damping"]))
+        moving.set("damping", _text(side["damping"], square) if square else _text(side["damping"]))
         if side["friction"] and not self._has_bristles(name):
-            hinge.set("frictionloss", _text(side["friction"]))
+            moving.set("frictionloss", _text(side["friction"]))
             reference, impedance = rigid_friction(self.step)
-            hinge.set("solreffriction", _text(*reference))
-            hinge.set("solimpfriction", _text(*impedance))
+            moving.set("solreffriction", _text(*reference))
+            moving.set("solimpfriction", _text(*impedance))
         held = "motor" if self.joint.one_body else "link"
         if name == held and self.joint.has("external_spring"):
             spring = self.joint.of("external_spring")
-            hinge.set("stiffness", _text(spring["stiffness_nm_rad"]))
-            hinge.set("springref", _text(spring["rest_rad"]))
+            moving.set("stiffness", _text(spring["stiffness_nm_rad"]))
+            moving.set("springref", _text(spring["rest_rad"]))
         size, colour = ("0.05 0.02", "0.3 0.4 0.6 1") if armature else ("0.02 0.1", "0.7 0.5 0.2 1")
         ET.SubElement(
             body, "geom", type="cylinder", size=size, rgba=colour, mass="0",
@@ -286,10 +289,11 @@ class _Builder:
         if stiffness > stiffest:
             stiffness, damping = stiffest, 2.0 * _BRISTLE_DAMPING * math.sqrt(stiffest * inertia)
             fastest = _RUNGE_KUTTA * level / (stiffness * self.step)
-            self.notes.append(
+            said = (
                 f"Friction of the {side} stands on bristles of {stiffness:.3g} N m/rad, as stiff "
                 f"as the time step allows; that is stable up to about {fastest:.2g} rad/s."
             )
+            self.notes.append(self.joint.in_units(said))
         return stiffness, damping, level, level + rise, velocity
 
     def _sensors(self) -> None:

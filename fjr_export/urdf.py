@@ -8,13 +8,21 @@ from xml.etree import ElementTree as ET
 from .joint import Joint
 
 _PLUGIN = "joint_state_topic_hardware_interface/JointStateTopicSystem"
+_TRAVEL_M = 1e3
+_NO_LIMIT = 1e9  # N
+_STAND_IN = {
+    False: "The mass is a stand-in; the inertia about the axis is what counts.",
+    True: "Inertias and travel are stand-ins; the mass along the axis is what counts.",
+}
+"""What a body says that it need not, by whether it slides."""
 
 
 def urdf(joint: Joint) -> str:
     """Return the joint as a URDF: base, joint and link, with the sums of motor and link.
 
     A URDF has no spring between motor and link, so it holds below the resonance alone. The hardware
-    of the ros2_control tag is the component that `fjr bridge` answers.
+    of the ros2_control tag is the component that `fjr bridge` answers. A joint that slides does so
+    along x, within a travel that stands in for the true one, which a URDF must state.
     """
     bare = joint.bare
     inertia = bare["jm"] + (0.0 if joint.one_body and math.isinf(bare["j"]) else bare["j"])
@@ -22,24 +30,28 @@ def urdf(joint: Joint) -> str:
     root.append(
         ET.Comment(
             f" One joint from {joint.title.replace('--', '- -')}, SI units: motor and link as one "
-            "body. The mass is a stand-in; the inertia about the axis is what counts. "
+            f"body. {_STAND_IN[joint.linear]} "
         )
     )
     ET.SubElement(root, "link", name="base")
     link = ET.SubElement(root, "link", name="link")
     inertial = ET.SubElement(link, "inertial")
-    ET.SubElement(inertial, "mass", value="1")
-    about = {name: _text(inertia) for name in ("ixx", "iyy", "izz")}
+    mass, turning = (inertia, 1.0) if joint.linear else (1.0, inertia)
+    ET.SubElement(inertial, "mass", value=_text(mass))
+    about = {name: _text(turning) for name in ("ixx", "iyy", "izz")}
     ET.SubElement(inertial, "inertia", {**about, **dict.fromkeys(("ixy", "ixz", "iyz"), "0")})
-    hinge = ET.SubElement(root, "joint", name="joint", type="continuous")
-    ET.SubElement(hinge, "parent", link="base")
-    ET.SubElement(hinge, "child", link="link")
-    ET.SubElement(hinge, "axis", xyz="0 0 1")
+    kind, axis = ("prismatic", "1 0 0") if joint.linear else ("continuous", "0 0 1")
+    moving = ET.SubElement(root, "joint", name="joint", type=kind)
+    ET.SubElement(moving, "parent", link="base")
+    ET.SubElement(moving, "child", link="link")
+    ET.SubElement(moving, "axis", xyz=axis)
     limit = joint.of("torque_saturation")["limit_nm"]
-    if math.isfinite(limit):
-        ET.SubElement(hinge, "limit", effort=_text(limit), velocity="1e3")
+    if joint.linear or math.isfinite(limit):
+        effort = _text(limit if math.isfinite(limit) else _NO_LIMIT)
+        travel = {"lower": _text(-_TRAVEL_M), "upper": _text(_TRAVEL_M)} if joint.linear else {}
+        ET.SubElement(moving, "limit", travel, effort=effort, velocity="1e3")
     ET.SubElement(
-        hinge, "dynamics", damping=_text(bare["fv"] + bare["fvm"]),
+        moving, "dynamics", damping=_text(bare["fv"] + bare["fvm"]),
         friction=_text(bare["fs"] + bare["fsm"]),
     )  # fmt: skip
     control = ET.SubElement(root, "ros2_control", name="rig", type="system")
@@ -52,10 +64,10 @@ def urdf(joint: Joint) -> str:
     ):
         ET.SubElement(hardware, "param", name=name).text = value
     commanded = ET.SubElement(control, "joint", name="joint")
-    effort = ET.SubElement(commanded, "command_interface", name="effort")
+    command = ET.SubElement(commanded, "command_interface", name="effort")
     if math.isfinite(limit):
-        ET.SubElement(effort, "param", name="min").text = _text(-limit)
-        ET.SubElement(effort, "param", name="max").text = _text(limit)
+        ET.SubElement(command, "param", name="min").text = _text(-limit)
+        ET.SubElement(command, "param", name="max").text = _text(limit)
     for name in ("position", "velocity", "effort"):
         ET.SubElement(commanded, "state_interface", name=name)
     ET.indent(root)

@@ -145,6 +145,7 @@ def save_parameter_file(
     values: Mapping[str, Mapping[str, Any]],
     groups: Mapping[str, ParameterGroup] | None = None,
     namespace: str = NAMESPACE,
+    head: Sequence[str] = (),
 ) -> None:
     """Write a parameter file that `load_parameter_file` and the nodes read back exactly.
 
@@ -153,11 +154,12 @@ def save_parameter_file(
         values: {node base name: {parameter: value}}.
         groups: descriptions by node base name, for a comment beside each value.
         namespace: where the rig's nodes are.
+        head: lines of a comment above all values.
 
     Raises:
         InputError: an empty list (a parameter file cannot hold one), or the file cannot be written.
     """
-    lines = []
+    lines = [f"# {line}" for line in head]
     for node, parameters in values.items():
         lines += [f"{namespace}/{node}:", f"  {_PARAMETERS}:" + ("" if parameters else " {}")]
         group = groups.get(node) if groups else None

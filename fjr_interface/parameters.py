@@ -8,10 +8,15 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 from fjr_kit.errors import InputError, shown
+
+from .linear_axis import as_linear
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
 
 Value = Any
 """A float, int, bool, str or tuple of floats: which one, the default in the description decides."""
@@ -81,6 +86,10 @@ class Parameter:
             raise InputError(f"{self.name} must lie in {self.range_text}, not {shown(value)}.")
         return value
 
+    def of_linear_axis(self) -> Self:
+        """Return the parameter in its unit of a linear axis."""
+        return replace(self, unit=as_linear(self.unit))
+
     @property
     def _in_unit(self) -> str:
         return f" in {self.unit}" if self.unit else ""
@@ -141,6 +150,10 @@ class ParameterGroup:
     def names(self) -> tuple[str, ...]:
         """All names in order."""
         return tuple(self._by_name)
+
+    def of_linear_axis(self) -> ParameterGroup:
+        """Return the group in the units of a linear axis."""
+        return ParameterGroup(*(parameter.of_linear_axis() for parameter in self))
 
     def defaults(self) -> dict[str, Value]:
         """Return all defaults by name."""

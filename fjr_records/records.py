@@ -86,6 +86,11 @@ class RecordSet:
         return tuple(sorted({record.level for record in self.records}))
 
     @cached_property
+    def linear(self) -> bool:
+        """Whether the axis is linear: m, N and kg stand for rad, N m and kg m2."""
+        return any(record.description.linear for record in self.records)
+
+    @cached_property
     def swings_free(self) -> bool:
         """Whether no run has a torque: then sizes show only as ratios to the inertia."""
         return not any(np.any(record.torque) for record in self.records)

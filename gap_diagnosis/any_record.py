@@ -22,6 +22,7 @@ from .model.nominal import datasheet
 from .model.quasi_static import stations
 from .model.rig_model import Model
 from .outcome.diagnosis import Diagnosis
+from .outcome.linear_words import in_linear_units
 from .steady_periods import investigate_periods
 from .which.search_space import TOLERANCE
 
@@ -128,7 +129,7 @@ def investigate(
             notes = [said, *other.diagnosis.notes]
             found = replace(other, diagnosis=other.diagnosis.model_copy(update={"notes": notes}))
             break
-    return found
+    return replace(found, diagnosis=in_linear_units(found.diagnosis))
 
 
 def _of_records(records: RecordSet, order: Order) -> Investigation:

@@ -159,9 +159,8 @@ def investigate_runs(
         order.nominal, order.tolerance, order.progress, order.search_ends,
     )  # fmt: skip
     model = Model.nominal(nominal)
-    linear_axis = any(record.description.linear for record in records.records)
     names = catalogue(
-        model.plant, order.effects, linear_axis=linear_axis, swings_free=records.swings_free
+        model.plant, order.effects, linear_axis=records.linear, swings_free=records.swings_free
     )
     if order.drift and order.effects is None:
         names.append(DRIFT)
@@ -262,10 +261,10 @@ def _run_scatter(
         if not moved_by_scatter(best, fitter.runs, scatter).any():
             return None, {}, []
         return None, scatter, [ASSUMED]
-    bags, seen = as_bags(changes, fitter.evidence), scattering(changes)
-    said = [f"What scatters from run to run: {seen}."] if seen else []
+    bags = as_bags(changes, fitter.evidence, fitter.misfit(best))
     drift = "" if isinstance(fitter.evidence.records, SteadyRuns) else drift_of_runs(bags)
-    return bags, relative_scatter(bags), [*said, *([drift] if drift else [])]
+    said = [sentence for sentence in (scattering(bags), drift) if sentence]
+    return bags, relative_scatter(bags), said
 
 
 def _rivals(

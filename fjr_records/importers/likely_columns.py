@@ -9,17 +9,28 @@ from .import_map import UNITS
 from .split_stamps import is_seconds, nanoseconds_beside
 from .stated_units import stated_unit
 
-_TIME = {"t", "time", "timestamp", "stamp", "zeit"}
+_TIME = {"t", "time", "timestamp", "stamp", "zeit", "temps"}
 _ASKED = {
     "r", "ref", "reference", "cmd", "command", "commanded", "des", "desired", "goal", "target",
-    "set", "setpoint", "soll",
+    "set", "setpoint", "soll", "sollwert", "consigne",
 }  # fmt: skip
 _TORQUE = {
     "tau", "torque", "trq", "u", "i", "iq", "current", "effort", "load", "force", "moment",
-    "voltage", "pwm",
+    "voltage", "pwm", "drehmoment", "kraft", "strom", "couple", "courant",
 }  # fmt: skip
-_ANGLE = {"pos", "position", "angle", "theta"}
-_MOTION = _ANGLE | {"q", "y", "enc", "encoder", "act", "actual", "meas", "measured", "ist"}
+_ANGLE = {"pos", "position", "angle", "theta", "winkel", "weg"}
+_MOTION = _ANGLE | {
+    "q",
+    "y",
+    "enc",
+    "encoder",
+    "act",
+    "actual",
+    "meas",
+    "measured",
+    "ist",
+    "istwert",
+}
 _OTHER = {
     "vel", "velocity", "speed", "acc", "acceleration", "dq", "ddq", "qd", "qdd", "temp", "error",
     "err", "enable", "enabled", "init", "supply", "status",

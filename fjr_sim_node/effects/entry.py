@@ -5,11 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from fjr_interface.linear_axis import PER_TURN
 from fjr_interface.parameters import Parameter
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
 
 Part = Literal["motor", "transmission", "link", "drive", "encoder", "time"]
 """What of a rig an effect acts on."""
@@ -130,6 +134,12 @@ class EffectParameter(Parameter):
             return self.low, self.high
         return max(self.low, self.fit[0] * scale), min(self.high, self.fit[1] * scale)
 
+    def of_linear_axis(self) -> Self:
+        """Return the parameter in its unit of a linear axis, where an angle is that of a phase."""
+        if self.role == "angle":
+            return self
+        return replace(self, unit=PER_TURN) if self.role == "cycles" else super().of_linear_axis()
+
     @property
     def may_be_negative(self) -> bool:
         """Whether the effect has two directions."""
@@ -245,6 +255,12 @@ class Effect:
     def on_held_link(self) -> bool:
         """Whether a rig with a flexible transmission whose link cannot move can have it."""
         return self.on_flexible_axis and self.acts_on != "link"
+
+    @property
+    def place_names(self) -> tuple[str, ...]:
+        """Full names of what says where a ripple lies: laid down when the machine was made."""
+        pairs = zip(self.names, self.parameters, strict=True)
+        return tuple(n for n, p in pairs if self.ripple and p.role in ("cycles", "angle"))
 
     @property
     def full_parameters(self) -> tuple[EffectParameter, ...]:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from fjr_interface.linear_axis import pitch_m
 from fjr_kit.number_text import unsigned_zero
+from fjr_sim_node import effects as fx
 
 from .diagnosis import Cause, Diagnosis, Estimate, EvidenceKind, Figure, Place
 from .verdict_words import explanation
@@ -123,6 +125,41 @@ def choice_sentences(diagnosis: Diagnosis) -> list[str]:
             f"updated.yaml: diagnose again with --effects {names}."
         )
     return said
+
+
+def summaries(diagnosis: Diagnosis) -> list[str]:
+    """Return a sentence about each named effect, and each that may stand in its place."""
+    pitch = pitches(diagnosis)
+    return [
+        f"{explanation([name])}: {fx.EFFECTS[name].summary} {pitch.get(name, '')}".rstrip()
+        for name in _named(diagnosis)
+    ]
+
+
+def summaries_with_telltales(diagnosis: Diagnosis) -> list[str]:
+    """Return the same with how each shows in the data."""
+    told = zip(summaries(diagnosis), _named(diagnosis), strict=True)
+    return [f"{what} Telltale: {fx.EFFECTS[name].telltale.words}." for what, name in told]
+
+
+def _named(diagnosis: Diagnosis) -> list[str]:
+    return list(dict.fromkeys(name for members in diagnosis.equivalent for name in members))
+
+
+def pitches(diagnosis: Diagnosis) -> dict[str, str]:
+    """Return a sentence on the pitch of each ripple by its effect; none for a rotary axis."""
+    found = diagnosis.parameters if diagnosis.linear else {}
+    return {
+        name.split(".")[0]: _sentence(estimate)
+        for name, estimate in found.items()
+        if "." in name and fx.parameter(name).role == "cycles"
+    }
+
+
+def _sentence(cycles: Estimate) -> str:
+    ends = (1e3 * pitch_m(count) for count in (cycles.value, cycles.high, cycles.low))
+    pitch, low, high = digits(Estimate(**dict(zip(("value", "low", "high"), ends, strict=True))))
+    return f"Its pitch is {pitch} mm ({low} to {high} mm)."
 
 
 def cause_name(cause: Cause) -> str:

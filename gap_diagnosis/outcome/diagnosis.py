@@ -103,11 +103,14 @@ class Bags(ResultModel):
         trends: of friction and of stiffness.
         scatter_percent: standard deviation of each parameter between bags.
         accounted: share of the misfit of all bags that such changes account for.
+        scatter_known: whether scatter_percent counts as the rig's own; if it accounts for too
+            little of the misfit, a law that the model lacks may make it instead.
     """
 
     trends: dict[str, BagTrend]
     scatter_percent: dict[str, Estimate]
     accounted: Number
+    scatter_known: bool = True
 
 
 class GapFigures(ResultModel):
@@ -221,6 +224,8 @@ class EvidenceKind(ResultModel):
         excitation: whether steady periods were compared, or records as they came.
         compared: what of rig and model was compared: their motion, or, in motion too slow for
             inertia to count, the torque alone.
+        axis: rotary, or linear: then all sizes are in m, N and kg where names end in rad, nm and
+            kg_m2, but for phases, and cycles_per_turn are those in 2 pi m.
     """
 
     noise: Literal["repeats", "standstill", "residual", "none"]
@@ -228,6 +233,7 @@ class EvidenceKind(ResultModel):
     controller: Literal["known", "gains_fitted", "unknown"]
     excitation: Literal["periodic", "record"]
     compared: Literal["motion", "torque"] = "motion"
+    axis: Literal["rotary", "linear"] = "rotary"
 
 
 class Candidate(ResultModel):
@@ -329,6 +335,11 @@ class Diagnosis(Document):
     def compared(self) -> Literal["motion", "torque"]:
         """What of rig and model was compared."""
         return "motion" if self.evidence is None else self.evidence.compared
+
+    @property
+    def linear(self) -> bool:
+        """Whether the axis is linear, with sizes in m, N and kg."""
+        return self.evidence is not None and self.evidence.axis == "linear"
 
     def missed(self, gap: Gap | Step | None) -> float | None:
         """Return the relative error of what was compared; None where it is not known."""

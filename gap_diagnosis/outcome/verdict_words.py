@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from fjr_sim_node import effects as fx
 from fjr_sim_node.simulation.simulator import SIMULATOR
 
 from .diagnosis import Diagnosis, ReportedOn, Verdict
@@ -283,21 +282,7 @@ def _sets(diagnosis: Diagnosis) -> str:
     )
 
 
-def summaries(diagnosis: Diagnosis) -> list[str]:
-    """Return a sentence about each named effect, and each that may stand in its place."""
-    return [f"{explanation([name])}: {fx.EFFECTS[name].summary}" for name in _named(diagnosis)]
-
-
-def summaries_with_telltales(diagnosis: Diagnosis) -> list[str]:
-    """Return the same with how each shows in the data."""
-    told = zip(summaries(diagnosis), _named(diagnosis), strict=True)
-    return [f"{what} Telltale: {fx.EFFECTS[name].telltale.words}." for what, name in told]
-
-
-def _named(diagnosis: Diagnosis) -> list[str]:
-    return list(dict.fromkeys(name for members in diagnosis.equivalent for name in members))
-
-
-def unit_of(name: str) -> str:
-    """Return the unit of a base parameter or of an effect's parameter."""
-    return SIMULATOR[name].unit
+def unit_of(name: str, *, linear: bool) -> str:
+    """Return the unit of a base parameter or of an effect's parameter on such an axis."""
+    parameter = SIMULATOR[name]
+    return (parameter.of_linear_axis() if linear else parameter).unit

@@ -10,9 +10,11 @@ from typing import Any
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 from controller_node.pd_filtered import CONTROLLER
 from excitation_node.multisine import EXCITATION
+from fjr_interface.linear_axis import as_linear
 from fjr_interface.parameter_file import save_parameter_file
 from fjr_interface.parameters import ParameterGroup
 from fjr_kit.atomic import result_folder, write_whole
@@ -24,6 +26,7 @@ from fjr_sim_node.simulation.simulator import SIMULATOR
 from ..how_far.run_comparison import RunComparison
 from ..how_far.steady_view import SteadyView
 from ..investigation import Investigation
+from ..outcome.linear_words import linear_head
 from .gap_figures import draw_residual_torque, draw_sigma_lines, draw_sigma_maps
 from .gap_plots import STAGES
 from .gap_report import compared, render_gap_report
@@ -76,21 +79,36 @@ def write_diagnosis(
         progress("writing diagnosis.json")
         (folder / "diagnosis.json").write_text(investigation.diagnosis.to_json(), encoding="utf-8")
         if investigation.diagnosis.parameters:
-            progress("writing updated.yaml")
-            values = updated_values(investigation.recorded, investigation.diagnosis)
-            save_parameter_file(folder / "updated.yaml", values, GROUPS)
-            progress("writing randomisation.yaml")
-            found = ranges(investigation.diagnosis.parameters, investigation.diagnosis.bags)
-            write_whole(folder / "randomisation.yaml", randomisation_yaml(found))
+            progress("writing updated.yaml and randomisation.yaml")
+            _write_parameters(investigation, folder)
         runs = compared(investigation)
         text = render_gap_report(investigation, runs, provenance(command, date))
-        _write_figures(_drawings(investigation, runs), folder / "figures", progress)
+        _write_figures(
+            _drawings(investigation, runs),
+            folder / "figures",
+            progress,
+            linear=investigation.diagnosis.linear,
+        )
         progress("writing report.html")
         (folder / "report.html").write_text(text, encoding="utf-8")
     return Path(out) / "report.html"
 
 
-def _write_figures(drawings: Mapping[str, Drawing], folder: Path, progress: Progress) -> None:
+def _write_parameters(investigation: Investigation, folder: Path) -> None:
+    diagnosis, groups, head = investigation.diagnosis, GROUPS, []
+    if diagnosis.linear:
+        groups = {node: group.of_linear_axis() for node, group in GROUPS.items()}
+        head = linear_head(diagnosis)
+    values = updated_values(investigation.recorded, diagnosis)
+    save_parameter_file(folder / "updated.yaml", values, groups, head=head)
+    found = ranges(diagnosis.parameters, diagnosis.bags)
+    text = randomisation_yaml(found, groups["simulator"])
+    write_whole(folder / "randomisation.yaml", text)
+
+
+def _write_figures(
+    drawings: Mapping[str, Drawing], folder: Path, progress: Progress, *, linear: bool
+) -> None:
     """Draw figures by their names, each as PNG and PDF; none where nothing was simulated."""
     if not drawings:
         return
@@ -98,7 +116,10 @@ def _write_figures(drawings: Mapping[str, Drawing], folder: Path, progress: Prog
     with rc_context(STYLE):
         for name, draw in drawings.items():
             progress(f"drawing {name}")
-            save(draw(), folder / name)
+            figure = draw()
+            for text in figure.findobj(Text) if linear else ():
+                text.set_text(as_linear(text.get_text()))
+            save(figure, folder / name)
 
 
 def _drawings(investigation: Investigation, found: Sequence[RunComparison]) -> dict[str, Drawing]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from fjr_interface.linear_axis import as_linear
 from fjr_kit.page import render_page
 
 from ..how_far.bla_comparison import compare
@@ -68,11 +69,14 @@ def render_gap_report(
         by_level, levels, shown = _steady_plots(steady, by_level, levels)
         overview |= shown
         values |= _steady_values(steady, diagnosis)
+    plots = {"overview": overview, "levels": by_level}
+    if diagnosis.linear:
+        plots, levels, values = (_linear(shown) for shown in (plots, levels, values))
     return render_page(
         "gap_diagnosis.report",
         "gap_report.html",
         title=f"Sim-to-real gap of {recorded.source}",
-        plots={"overview": overview, "levels": by_level},
+        plots=plots,
         provenance=origin(
             recorded.source, _controller(investigation), investigation.nominal, provenance
         ),
@@ -84,6 +88,15 @@ def render_gap_report(
         bags=_bags(investigation),
         **values,
     )
+
+
+def _linear(shown: Any) -> Any:
+    """Return what is shown with all units in its texts as those of a linear axis."""
+    if isinstance(shown, str):
+        return as_linear(shown)
+    if isinstance(shown, Mapping):
+        return {key: _linear(each) for key, each in shown.items()}
+    return [_linear(each) for each in shown] if isinstance(shown, list) else shown
 
 
 def _fitted_values(investigation: Investigation, fitted: Fitted) -> dict[str, Any]:

@@ -68,7 +68,10 @@ def causes(diagnosis: Diagnosis) -> list[Row]:
             cause_name(cause),
             percent(cause.present),
             share_words(cause.share),
-            [f"{_estimate(n, e)} {unit_of(n)}".rstrip() for n, e in cause.parameters.items()],
+            [
+                f"{_estimate(n, e)} {unit_of(n, linear=diagnosis.linear)}".rstrip()
+                for n, e in cause.parameters.items()
+            ],
             "-" if cause.invariance_p is None else f"{cause.invariance_p:.2g}",
             [place_words(place) for place in cause.where[:MOST_ACTS]],
         )
@@ -117,9 +120,8 @@ def parameters(space: Space, diagnosis: Diagnosis, nominal: Mapping[str, float])
         given = nominal.get(name, nan)
         change = 100.0 * (e.value / given - 1.0) if given else nan
         note: Cell = Mark("at its bound", "fail") if _at(e.value, bounds.get(name)) else ""
-        rows.append(
-            (name, unit_of(name), given, *digits(e), change, _written(name, e, written), note)
-        )
+        unit = unit_of(name, linear=diagnosis.linear)
+        rows.append((name, unit, given, *digits(e), change, _written(name, e, written), note))
     return rows
 
 

@@ -12,9 +12,10 @@ from ..outcome.cause_words import (
     evidence_sentences,
     remainder_sentences,
     share_sentences,
+    summaries,
 )
 from ..outcome.diagnosis import Diagnosis
-from ..outcome.verdict_words import HELD_OUT, action, closed, doubt, headline, meaning, summaries
+from ..outcome.verdict_words import HELD_OUT, action, closed, doubt, headline, meaning
 from .gap_tables import causes, contenders
 from .waterfall import height, waterfall_plot
 

@@ -2,7 +2,8 @@
 
 A policy or a controller that is tried over these ranges meets the rig on any of its days: each
 range holds 95 % of runs, by what the fit does not know of a parameter and by what the parameter
-scatters from run to run.
+scatters from run to run. Where a ripple lies along the motion is laid down in the machine and has
+no range.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from dataclasses import dataclass
 
 import yaml
 
-from fjr_interface.parameters import Parameter
+from fjr_interface.parameters import Parameter, ParameterGroup
 from fjr_sim_node import effects as fx
 from fjr_sim_node.plant import PLANT
 
@@ -23,13 +24,23 @@ from ..which.estimates import run_scatter
 
 _NORMAL_95 = 1.96
 _HEAD = """\
-# Ranges for domain randomisation, beside updated.yaml: 95 % of runs of this rig lie within.
+# Ranges for domain randomisation, beside updated.yaml.
+# {hold}
 # uncertainty: standard error of the fit, of what is the same in all runs.
-# scatter: standard deviation from run to run; 0 where none shows, null where it was not looked for.
+# scatter: standard deviation from run to run; 0 where none shows, null where it is not known.
 # Draw all values once for each run, each from a normal distribution about `value` with
 # sqrt(uncertainty^2 + scatter^2), cut at `low` and `high`; errors of several parameters that
 # the fit cannot tell apart are drawn independently here, which is wider than the rig.
+# What is not listed keeps its value of updated.yaml: cycles and phase of a ripple are the
+# machine's for good, and drawn apart they would put it in wrong places.
+simulator:
 """
+_RUNS = "95 % of runs of this rig lie within, as far as the laws of updated.yaml are the rig's."
+_FIT = (
+    "They hold what the fit does not know, but runs may lie beyond them: how far the rig\n"
+    "# scatters from run to run is not known, since the runs are too few or differ by more than\n"
+    "# scatter explains."
+)
 
 
 @dataclass(frozen=True)
@@ -40,7 +51,7 @@ class Range:
         value: of the better simulation.
         uncertainty: standard error of the fit.
         scatter: standard deviation from run to run; None where that is not known.
-        low, high: hold 95 % of runs.
+        low, high: hold 95 % of runs; of what the fit does not know where scatter is None.
     """
 
     value: float
@@ -54,16 +65,19 @@ def ranges(found: Mapping[str, Estimate], bags: Bags | None) -> dict[str, Range]
     """Return the range of each parameter that the simulator takes.
 
     What the bare plant lacked counts to the parameter that it adds to. A parameter whose interval
-    is not known, such as a limit that no run reaches, has no range.
+    is not known, such as a limit that no run reaches, has no range, and cycles and phase of a
+    ripple have none.
 
     Args:
         found: parameters with their intervals.
         bags: how far each scatters; None where that is not known.
     """
     scatter = run_scatter(found, bags)
-    told = () if bags is None else [p for n in bags.scatter_percent for p in SCATTERING[n]]
+    known = {} if bags is None or not bags.scatter_known else bags.scatter_percent
+    told = [parameter for name in known for parameter in SCATTERING[name]]
     parts: dict[str, list[str]] = {}
-    for name in found:
+    fixed = {name for effect in fx.CATALOGUE for name in effect.place_names}
+    for name in [name for name in found if name not in fixed]:
         whole = fx.parameter(name).adds_to or name if "." in name else name
         parts.setdefault(whole, []).append(name)
     ranged = {}
@@ -86,19 +100,27 @@ def ranges(found: Mapping[str, Estimate], bags: Bags | None) -> dict[str, Range]
     return ranged
 
 
-def randomisation_yaml(found: Mapping[str, Range]) -> str:
-    """Return the text of randomisation.yaml."""
-    entries = {
-        name: {
-            "value": _short(r.value),
-            "uncertainty": _short(r.uncertainty),
-            "scatter": None if r.scatter is None else _short(r.scatter),
-            "low": _short(r.low),
-            "high": _short(r.high),
-        }
-        for name, r in found.items()
+def randomisation_yaml(found: Mapping[str, Range], group: ParameterGroup) -> str:
+    """Return the text of randomisation.yaml, with units from the simulator's parameters."""
+    scatters = any(each.scatter is not None for each in found.values())
+    lines = [f"  {name}: {_entry(each)}{_unit(group[name])}\n" for name, each in found.items()]
+    return _HEAD.format(hold=_RUNS if scatters else _FIT) + "".join(lines)
+
+
+def _entry(found: Range) -> str:
+    entry = {
+        "value": _short(found.value),
+        "uncertainty": _short(found.uncertainty),
+        "scatter": None if found.scatter is None else _short(found.scatter),
+        "low": _short(found.low),
+        "high": _short(found.high),
     }
-    return _HEAD + yaml.safe_dump({"simulator": entries}, sort_keys=False, default_flow_style=None)
+    flow = yaml.safe_dump(entry, sort_keys=False, default_flow_style=True, width=math.inf)
+    return str(flow).strip()
+
+
+def _unit(parameter: Parameter) -> str:
+    return f"  # {parameter.unit}" if parameter.unit else ""
 
 
 def _short(value: float) -> float:

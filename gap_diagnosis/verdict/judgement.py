@@ -124,6 +124,7 @@ def judge(
             controller=evidence.simulator.loop.kind,
             excitation="periodic" if isinstance(evidence.records, SteadyRuns) else "record",
             compared="torque" if evidence.slow else "motion",
+            axis="linear" if evidence.records.linear else "rotary",
         ),
         causes=causes,
         doubted=_doubted(found, causes),

@@ -34,6 +34,8 @@ NORMAL_95 = 1.96
 def form(fit: CellFit, share: float) -> np.ndarray:
     """Return the standard deviation of a fit's parameters by the forms of the effects' laws.
 
+    A number of cycles has none: whatever the form of a ripple, its period is the machine's.
+
     Base parameters follow the effects where a remainder stays: a joint's inertia was off by more
     than its own error in a third of robot joints beside friction of another form.
 
@@ -46,9 +48,9 @@ def form(fit: CellFit, share: float) -> np.ndarray:
         is left, or there are no effects.
     """
     own, x = len(fit.space.nominal), fit.solution.x
-    angles = np.array([fx.parameter(name).role == "angle" for name in fit.space.effects], bool)
-    units = np.array(fit.space.units)
-    sizes = np.where(angles, 1.0 / units, np.abs(x[own:])) if angles.size else x[own:]
+    roles = np.array([fx.parameter(name).role for name in fit.space.effects], str)
+    sizes = np.where(roles == "angle", 1.0 / np.array(fit.space.units), np.abs(x[own:]))
+    sizes = np.where(roles == "cycles", 0.0, sizes)
     base = np.full(own, float(share >= FORM_BESIDE and sizes.size > 0))
     return share * np.concatenate([base, sizes])
 
@@ -186,13 +188,14 @@ def deviations(fit: CellFit, scatter: Mapping[str, float]) -> np.ndarray:
 def run_scatter(found: Mapping[str, Estimate], bags: Bags | None) -> dict[str, float]:
     """Return the standard deviation of parameters from run to run, each in its own unit.
 
-    What the bare plant lacked scatters as the parameter that it adds to.
+    What the bare plant lacked scatters as the parameter that it adds to. Empty where the scatter
+    may be that of a law which is not the rig's.
 
     Args:
         found: parameters with their intervals.
         bags: how far each scatters; None where that is not known.
     """
-    scattering = relative_scatter(bags)
+    scattering = relative_scatter(bags if bags is not None and bags.scatter_known else None)
     origin = {name: fx.parameter(name).adds_to if "." in name else name for name in found}
     return {
         name: abs(found[name].value) * scattering[part]

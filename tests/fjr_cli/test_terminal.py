@@ -150,6 +150,31 @@ def test_diagnose_says_causes_remainder_and_evidence_of_records_whole(console):
         assert said in text, said
 
 
+def test_a_linear_axis_has_its_units_and_the_pitch_of_a_ripple(console):
+    found = {
+        "cogging.amplitude_nm": Estimate(value=6.0, low=5.6, high=6.4),
+        "cogging.cycles_per_turn": Estimate(value=261.801, low=261.790, high=261.812),
+        "cogging.phase_rad": Estimate(value=0.3, low=0.2, high=0.4),
+    }
+    diagnosis = Diagnosis(
+        verdict="effect",
+        effects=["cogging"],
+        equivalent=[["cogging"]],
+        confidence=0.9,
+        evidence=EvidenceKind(
+            noise="none", reported_on="blocks", controller="known", excitation="record",
+            axis="linear",
+        ),
+        gap=Gaps(nominal=None, refit=None, explained=None, noise_floor=None),
+        parameters=found,
+    )  # fmt: skip
+    diagnosis_summary.print_summary(diagnosis, console, Path("out"))
+    text = " ".join(printed(console).split())
+    assert "Its pitch is 23.9999 mm (23.9988 to 24.0009 mm)." in text
+    assert set(text.split()) >= {"5.60", "6.40", "N", "261.790", "per", "pi", "rad"}, text
+    assert "N m" not in text
+
+
 def test_replay_cuts_no_number(console):
     difference = Difference(
         unit="N m",

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from xml.etree import ElementTree as ET
+
 import numpy as np
 import pytest
 from effect_rig import CONTROLLER, axis, moderate, multisine_reference, relative_rms
@@ -11,6 +14,7 @@ from fjr_export.joint import Joint
 from fjr_export.mjcf import mujoco_model
 from fjr_export.targets import MuJoCoJoint
 from fjr_export.treatments import MJCF
+from fjr_export.urdf import urdf
 from fjr_kit.errors import InputError
 from fjr_sim_node import SIMULATOR, effects, plant
 from fjr_sim_node.simulation.closed_loop import simulate
@@ -54,6 +58,23 @@ def test_each_effect_moves_the_joint_as_our_simulation_does(effect: str):
     reference = multisine_reference(2e-3)[:SAMPLES]
     error = relative_rms(played(joint, reference), simulated(joint, reference))
     assert error < TOLERANCE[MJCF[effect].kind], error
+
+
+def test_a_joint_that_slides_moves_as_one_that_turns_by_the_same_numbers():
+    cogging = {"cogging.amplitude_nm": 0.5, "cogging.cycles_per_turn": 40.0}
+    turning = joint_of({**moderate("coulomb_friction"), **cogging})
+    sliding = replace(turning, linear=True)
+    kinds = {one.get("type") for one in ET.fromstring(mujoco_model(sliding).xml).iter("joint")}
+    assert kinds >= {"slide"} and "hinge" not in kinds
+    reference = multisine_reference(2e-3)[:SAMPLES]
+    assert relative_rms(played(sliding, reference), played(turning, reference)) < 1e-6
+    target = MuJoCoJoint.of_urdf(urdf(sliding), sliding)
+    assert target.position() == 0.0
+    target.begin(0.0, 0.0)
+    target.hold(100.0)
+    assert target.position() > 0.0
+    moving = ET.fromstring(urdf(sliding)).find("joint")
+    assert moving.get("type") == "prismatic" and moving.find("limit").get("lower") is not None
 
 
 @pytest.mark.parametrize("amplitude", [2e-3, 7e-3])

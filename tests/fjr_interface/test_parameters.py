@@ -10,9 +10,12 @@ from hypothesis import strategies as st
 
 from controller_node.pd_filtered import CONTROLLER
 from excitation_node.multisine import EXCITATION
+from fjr_interface.linear_axis import as_linear
 from fjr_interface.parameters import Parameter, ParameterGroup, nearest
 from fjr_kit.errors import InputError
+from fjr_sim_node.effects import PARAMETERS
 from fjr_sim_node.plant import PLANT
+from fjr_sim_node.simulation.simulator import SIMULATOR
 
 GROUP = ParameterGroup(
     Parameter("gain", 1.0, "N m/rad", "Gain", 0.0, 10.0),
@@ -31,6 +34,26 @@ def test_defaults_pass_their_own_check_unchanged(group):
     assert {k: type(v) for k, v in checked.items()} == {
         k: type(v) for k, v in group.defaults().items()
     }
+
+
+@pytest.mark.parametrize(
+    ("said", "linear"),
+    [
+        ("N m", "N"), ("kg m2", "kg"), ("rad/s", "m/s"), ("N m s/rad", "N s/m"),
+        ("N m/rad3", "N/m3"), ("N m s2/rad2", "N s2/m2"), ("rad/N m", "m/N"), ("Hz", "Hz"),
+        ("dB re 1 rad/(N m)", "dB re 1 m/N"), ("u of the rig (N m)", "u of the rig (N)"),
+        ("a radical 3 N move", "a radical 3 N move"),
+    ],
+)  # fmt: skip
+def test_units_of_a_linear_axis(said, linear):
+    assert as_linear(said) == linear
+
+
+def test_a_linear_axis_has_no_unit_of_a_rotary_one_but_of_phases():
+    turning = {p.name for p in SIMULATOR.of_linear_axis() if "rad" in p.unit or "N m" in p.unit}
+    angles = {p.name for p in PARAMETERS if p.role == "angle"}
+    assert turning == angles
+    assert SIMULATOR.of_linear_axis()["cogging.cycles_per_turn"].unit == "per 2 pi m"
 
 
 @pytest.mark.parametrize("group", [PLANT, CONTROLLER, EXCITATION])

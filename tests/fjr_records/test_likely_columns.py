@@ -24,6 +24,18 @@ from fjr_records.importers.likely_columns import likely_map
         (["load_angle", "torque_ref"], "position=load_angle"),
         (["para.k_T", "run.t", "y_T"], "time=run.t position=y_T"),
         (["q1", "q2", "tau1", "tau2"], ""),
+        (
+            ["Zeit [ms]", "Soll [mm]", "Ist [mm]", "Kraft [N]"],
+            "time=Zeit [ms] reference=Soll [mm] torque=Kraft [N] position=Ist [mm]",
+        ),
+        (
+            ["Zeit", "Weg", "Strom [A]"],
+            "time=Zeit torque=Strom [A]:FACTOR position=Weg",
+        ),
+        (
+            ["temps", "consigne", "couple", "position"],
+            "time=temps reference=consigne torque=couple position=position",
+        ),
         (["a,b", "0", "1", "torque:x"], ""),
     ],
 )

@@ -7,9 +7,9 @@ import pytest
 from gap_cases import changes_of, simulate_case, vary
 
 from gap_diagnosis.any_record import investigate
-from gap_diagnosis.gates.bag_changes import TREND_FALSE_ALARM, BagChanges, Scatter
+from gap_diagnosis.gates.bag_changes import TREND_FALSE_ALARM
 from gap_diagnosis.gates.bags_gate import as_bags, bags_gate, scattering
-from gap_diagnosis.outcome.diagnosis import Diagnosis
+from gap_diagnosis.outcome.diagnosis import Bags, Diagnosis, Estimate
 
 FRICTION = ("fs", "fsm", "fv", "fvm")
 
@@ -41,7 +41,7 @@ def gate_of(recorded, model):
     """Return the gate on trends, with what changes."""
     changes, evidence = changes_of(recorded, model)
     bags = None if changes is None else as_bags(changes, evidence)
-    return bags_gate(bags, recorded), bags, "" if changes is None else scattering(changes)
+    return bags_gate(bags, recorded), bags, "" if bags is None else scattering(bags)
 
 
 @pytest.mark.parametrize("apart", [True, False], ids=["each by itself", "all together"])
@@ -127,8 +127,13 @@ def test_a_diagnosis_of_a_rig_whose_friction_scatters_tells_the_scatter(tmp_path
 
 
 def test_percents_are_written_as_people_write_them():
-    found = (Scatter("fs", 0.234, 0.12, 1.504), Scatter("fvm", 0.05, 0.001, 0.9996))
-    assert scattering(BagChanges((), found, 1.0)) == "fs by 23 % (12 to 150 %)"
+    found = {
+        "fs": Estimate(value=23.4, low=12.0, high=150.4),
+        "fvm": Estimate(value=5.0, low=0.1, high=99.96),
+    }
+    bags = Bags(trends={}, scatter_percent=found, accounted=1.0)
+    said = "What scatters from run to run: link Coulomb friction (fs) by 23 % (12 to 150 %)."
+    assert scattering(bags) == said
 
 
 def test_bags_in_which_the_link_never_moves_are_not_compared():

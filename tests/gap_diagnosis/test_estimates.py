@@ -12,7 +12,7 @@ from gap_diagnosis.model.rig_model import Model
 from gap_diagnosis.outcome.cause_words import digits, percent
 from gap_diagnosis.outcome.diagnosis import Estimate
 from gap_diagnosis.which.comparison import CellFit
-from gap_diagnosis.which.estimates import kept_from_zero, linear_estimates, standard_errors
+from gap_diagnosis.which.estimates import form, kept_from_zero, linear_estimates, standard_errors
 from gap_diagnosis.which.least_squares import Solution
 from gap_diagnosis.which.presence import beyond_zero, cell_estimates
 from gap_diagnosis.which.search_space import Space
@@ -92,6 +92,12 @@ def fitted(names: tuple[str, ...], values: tuple[float, ...], stds: tuple[float,
     model = Model({}, dict(zip(names, values, strict=True)))
     solution = Solution(np.array(values), 0.0, columns, residuals, True)
     return fit_of(effects, model, Space({}, names, (1.0,) * len(names)), solution)
+
+
+def test_the_period_of_a_ripple_is_known_as_the_fit_knows_it_and_its_size_as_its_law():
+    names = ("cogging.amplitude_nm", "cogging.cycles_per_turn", "cogging.phase_rad")
+    ripple = fitted(names, (0.5, 200.0, 0.3), (1e-3, 0.01, 1e-3))
+    assert form(ripple, 0.03) == pytest.approx([0.015, 0.0, 0.03])
 
 
 BIAS, ECCENTRIC = "torque_bias.torque_nm", "encoder_eccentricity.amplitude_rad"

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import io
 import math
 from functools import cache
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from controller_node import pd_filtered
+from fjr_cli.diagnosis_summary import print_summary
 from fjr_interface.experiment import RecordDescription
 from fjr_records.records import Record, RecordSet
 from fjr_sim_node.plant import coefficients
 from fjr_sim_node.simulation.closed_loop import simulate
 from gap_diagnosis.any_record import investigate
+from gap_diagnosis.investigation import Investigation
 from gap_diagnosis.model.evidence import Evidence
+from gap_diagnosis.report.gap_output import write_diagnosis
 
 RATE, NOISE = 500.0, 2e-6
 MASS, COULOMB, VISCOUS = 95.0, 20.0, 200.0
@@ -73,8 +78,35 @@ def test_the_simulation_errs_by_a_share_of_the_torque_not_of_a_motion_that_is_he
     assert np.all(floor <= 1.01 * np.hypot(1e-3 * motion, evidence.noise.std_rad))
 
 
+@cache
+def named() -> Investigation:
+    """Return what a diagnosis of the carriage finds."""
+    return investigate(carriage(), BARE, effects=LOOKED_FOR)
+
+
+def test_a_diagnosis_of_a_linear_axis_says_its_units_in_every_file(tmp_path):
+    found = named()
+    assert found.diagnosis.linear
+    write_diagnosis(found, tmp_path)
+    randomised, updated, report = (
+        (tmp_path / name).read_text(encoding="utf-8")
+        for name in ("randomisation.yaml", "updated.yaml", "report.html")
+    )
+    for text in (randomised, updated, report):
+        assert "N m" not in text and "kg m2" not in text
+    for unit in ("kg", "N", "N s/m"):
+        assert f"}}  # {unit}\n" in randomised and f"[{unit}]; range" in updated
+    assert "fjr export takes this file with --linear" in updated
+    shown = report.split('id="plots"')[0]
+    assert "N s/m" in shown and "y (m)" in report and " rad" not in updated.replace("in rad", "")
+    console = Console(file=io.StringIO(), width=100)
+    print_summary(found.diagnosis, console, tmp_path, runs=False)
+    told = console.file.getvalue()
+    assert "N s/m" in told and "N m" not in told and "fjr export --linear" in told
+
+
 def test_friction_of_a_carriage_is_named_though_its_loop_is_not_known():
-    diagnosis = investigate(carriage(), BARE, effects=LOOKED_FOR).diagnosis
+    diagnosis = named().diagnosis
     assert {cause.effect for cause in diagnosis.causes} == {"coulomb_friction", "viscous_friction"}
     found = diagnosis.parameters
     assert found["coulomb_friction.motor_nm"].value == pytest.approx(COULOMB, rel=0.1)

@@ -16,6 +16,7 @@ from fjr_records.records import Record, RecordSet
 from fjr_sim_node import effects as fx
 from fjr_sim_node.plant import PLANT, coefficients
 from fjr_sim_node.simulation.closed_loop import simulate
+from fjr_sim_node.simulation.simulator import SIMULATOR
 from gap_diagnosis.gates.bag_deviations import deviations, run_errors
 from gap_diagnosis.gates.bags_gate import as_bags, drift_of_runs, run_changes, scattering
 from gap_diagnosis.model.evidence import Evidence
@@ -127,8 +128,23 @@ def test_a_steady_rig_whose_law_is_not_quite_the_model_scatters_nowhere():
     """What a wrong law leaves is alike in all runs, and differs from block to block."""
     records, _ = recorded(0.0, 5, {"cogging.amplitude_nm": 0.3, "cogging.cycles_per_turn": 40.0})
     changes, evidence = changes_of(records)
-    assert scattering(changes) == ""
-    assert drift_of_runs(as_bags(changes, evidence)) == ""
+    bags = as_bags(changes, evidence)
+    assert scattering(bags) == ""
+    assert drift_of_runs(bags) == ""
+
+
+def test_what_a_wrong_law_makes_is_not_told_as_scatter():
+    """A torque ripple that the model lacks takes another part of each run's friction."""
+    ripple = {"cogging.amplitude_nm": 3.0, "cogging.cycles_per_turn": 20.0}
+    found = as_bags(*changes_of(recorded(0.0, 5, ripple)[0]))
+    assert found.scatter_percent["fvm"].low > 0.5  # and does not scatter at all
+    said = scattering(found)
+    assert "is not known" in said and "only 19 % of its misfit" in said and "fvm" not in said
+    each = {"fvm": Estimate(value=1.0, low=0.9, high=1.1)}
+    assert ranges(each, found)["fvm"].scatter is None
+    told = as_bags(*changes_of(recorded(0.02, 5)[0]))
+    assert "link Coulomb friction (fs) by" in scattering(told)
+    assert ranges(each, told)["fvm"].scatter > 0.0
 
 
 def test_friction_that_rises_from_run_to_run_is_a_trend_and_one_that_scatters_is_none():
@@ -167,11 +183,31 @@ def test_a_friction_that_the_datasheet_lacks_scatters_as_the_one_that_it_adds_to
 
 
 def test_the_file_says_what_is_not_known_and_is_read_back():
-    text = randomisation_yaml(ranges(FOUND, bags(fsm=4.0, fs=1.0)))
-    assert text.startswith("#") and "95 % of runs" in text
+    text = randomisation_yaml(ranges(FOUND, bags(fsm=4.0, fs=1.0)), SIMULATOR)
+    assert text.startswith("#") and "95 % of runs of this rig lie within" in text
     read = yaml.safe_load(text)["simulator"]
     assert read["jm"]["scatter"] is None and read["fsm"]["scatter"] == pytest.approx(0.24)
     assert read["jm"]["low"] < 0.2 < read["jm"]["high"]
+
+
+def test_a_file_without_scatter_says_that_runs_may_lie_beyond_its_ranges():
+    for known in (None, bags(fsm=4.0).model_copy(update={"scatter_known": False})):
+        text = randomisation_yaml(ranges(FOUND, known), SIMULATOR)
+        assert "lie within" not in text and "runs may lie beyond" in text
+        assert yaml.safe_load(text)["simulator"]["fsm"]["scatter"] is None
+
+
+def test_the_place_of_a_ripple_is_not_drawn_and_units_stand_beside_what_is():
+    each = Estimate(value=1.0, low=0.9, high=1.1)
+    names = [p for e in ("cogging", "gravity") for p in fx.EFFECTS[e].names]
+    found = ranges({"jm": each, **dict.fromkeys(names, each)}, None)
+    assert set(found) == {
+        "jm", "cogging.amplitude_nm", "cogging.second_ratio", "gravity.torque_nm",
+        "gravity.angle_rad",
+    }  # fmt: skip
+    assert "high: 1.1}  # kg m2\n" in randomisation_yaml(found, SIMULATOR)
+    linear = randomisation_yaml(found, SIMULATOR.of_linear_axis())
+    assert "high: 1.1}  # kg\n" in linear and "high: 1.1}  # N\n" in linear
 
 
 @given(st.floats(0.0, 50.0), st.floats(1e-3, 1e3), st.floats(0.0, 1.0))
