@@ -65,7 +65,7 @@ def test_the_parameter_that_scatters_is_told_from_those_that_do_not(case):
     found = bags.scatter_percent
     assert gate.passed and found["fsm"].low <= 3.0 <= found["fsm"].high
     assert all(found[name].value < 0.3 for name in ("fs", "stiffness"))
-    assert "fsm by" in said and "fs by" not in said
+    assert "(fsm) by" in said and "(fs)" not in said
 
 
 def test_bags_of_a_steady_rig_show_neither_scatter_nor_trend(case):
