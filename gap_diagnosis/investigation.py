@@ -261,7 +261,7 @@ def _run_scatter(
         if not moved_by_scatter(best, fitter.runs, scatter).any():
             return None, {}, []
         return None, scatter, [ASSUMED]
-    bags = as_bags(changes, fitter.evidence, fitter.misfit(best))
+    bags = as_bags(changes, fitter.evidence, fitter.misfit(best) < NOTHING_LEFT)
     drift = "" if isinstance(fitter.evidence.records, SteadyRuns) else drift_of_runs(bags)
     said = [sentence for sentence in (scattering(bags), drift) if sentence]
     return bags, relative_scatter(bags), said

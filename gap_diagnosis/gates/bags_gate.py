@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from scipy import stats
 
@@ -14,7 +12,6 @@ from ..model.evidence import Evidence
 from ..model.rig_model import Model
 from ..model.steady_runs import SteadyRuns
 from ..outcome.diagnosis import Bags, BagTrend, Estimate
-from ..which.comparison import NOTHING_LEFT
 from .bag_changes import TREND_FALSE_ALARM, BagChanges, bag_changes, levels_agree
 from .bag_deviations import run_errors
 from .gate_checks import Gate, untested
@@ -128,13 +125,13 @@ def _along(trend: BagTrend) -> str:
     )
 
 
-def as_bags(changes: BagChanges, evidence: Evidence, misfit: float = math.inf) -> Bags:
+def as_bags(changes: BagChanges, evidence: Evidence, explained: bool = False) -> Bags:
     """Return changes as the outcome holds them, trends from the first run to the last.
 
     Args:
         changes: of the parameters of the best model.
         evidence: the runs.
-        misfit: of that model, its mean squared error over that of noise.
+        explained: whether noise explains all that the model leaves.
     """
     span = float(np.ptp(_times(evidence)))
     return Bags(
@@ -147,7 +144,7 @@ def as_bags(changes: BagChanges, evidence: Evidence, misfit: float = math.inf) -
             for s in changes.scatters
         },
         accounted=changes.accounted,
-        scatter_known=changes.accounted >= SCATTER_EXPLAINS or misfit < NOTHING_LEFT,
+        scatter_known=changes.accounted >= SCATTER_EXPLAINS or explained,
     )
 
 
