@@ -257,7 +257,8 @@ def test_the_folder_holds_all_that_was_promised_and_earlier_files_go(found, tmp_
 def test_diagnosis_json_has_the_fields_of_its_schema_and_no_other(found):
     text = json.loads(found.diagnosis.to_json())
     assert list(text) == [
-        "schema", "verdict", "effects", "equivalent", "confidence", "evidence", "causes", "steps",
+        "schema", "verdict", "effects", "equivalent", "confidence", "evidence", "causes",
+        "doubted", "steps",
         "remainder", "gap", "gap_closed", "gap_figures", "bags", "where",
         "contenders", "ranking", "parameters", "next_experiment", "notes",
     ]  # fmt: skip
