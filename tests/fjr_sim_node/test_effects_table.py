@@ -140,7 +140,7 @@ name = "cubic_drag.nm_s3_rad3"
 assert SIMULATOR[name].unit == "N m s3/rad3"
 assert load_parameter_file("rig.yaml")["simulator"][name] == 2.0
 assert "**`cubic_drag`**" in document.table()
-assert unit_of(name) == "N m s3/rad3" and explanation(["cubic_drag"]) == "cubic drag"
+assert unit_of(name, linear=False) == "N m s3/rad3" and explanation(["cubic_drag"]) == "cubic drag"
 assert "| `cubic_drag` | refused: it is not expressed in MuJoCo so far |" in table()
 for target in TARGETS:
     try:
