@@ -45,7 +45,7 @@ TRANSMISSION: tuple[Effect, ...] = (
         "The transmission has a dead zone.",
         "transmission",
         "plant.spring:spring_torque",
-        Telltale("low amplitude, more gain at 2-13 Hz", "deflection"),
+        Telltale("low amplitude, more gain below the resonance", "deflection"),
         "Nordin, Gutman 2002, Automatica 38(10), dead-zone model",
         (size("half_gap_rad", "rad", "Half the dead zone of the deflection", 0.0, 1.0),),
         ({"half_gap_rad": (2e-3, 0.01, 0.04, 0.2)},),
