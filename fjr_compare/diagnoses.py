@@ -7,9 +7,10 @@ import math
 from scipy.stats import norm
 
 from fjr_sim_node.simulation.simulator import SIMULATOR
-from gap_diagnosis.outcome.diagnosis import Diagnosis, Gap
+from gap_diagnosis.fits.estimates import run_scatter
+from gap_diagnosis.outcome.diagnosis import Diagnosis
+from gap_diagnosis.outcome.gap_size import Gap
 from gap_diagnosis.outcome.verdict_words import unit_of
-from gap_diagnosis.which.estimates import run_scatter
 
 from .result import CauseDifference, Pair, ParameterDifference
 

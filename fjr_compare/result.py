@@ -16,7 +16,7 @@ from fjr_kit.result_types import (
     ResultModel,
     Unit,
 )
-from gap_diagnosis.outcome.diagnosis import Estimate, Gap
+from gap_diagnosis.outcome.gap_size import Estimate, Gap
 
 Kind = Literal["campaigns", "diagnoses"]
 PowerKind = Literal["total", "odd", "even", "noise"]

@@ -14,7 +14,8 @@ Tables go to a `terminal` or, where the code is what they describe, into a docum
 
 `compiled` caches the numerical kernels by the state of their sources, each compiled once, `imports`
 finds the sources that a kept result rests on, `installed` where packages and extras are.
-`public_names` imports what a package exports when it is asked for. `showing` says what a refit of
+`public_names` imports what a package exports when it is asked for. `least_squares` fits with
+Jacobians of one batch. `showing` says what a refit of
 parameters leaves of a change, and how large a change must be to show. Nothing here imports another
 package of the product.
 """

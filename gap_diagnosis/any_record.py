@@ -23,8 +23,8 @@ from .model.quasi_static import stations
 from .model.rig_model import Model
 from .outcome.diagnosis import Diagnosis
 from .outcome.linear_words import in_linear_units
+from .starts.search_space import TOLERANCE
 from .steady_periods import investigate_periods
-from .which.search_space import TOLERANCE
 
 
 def diagnose(

@@ -15,8 +15,8 @@ from fjr_sim_node import effects as fx
 
 from .investigation import Investigation
 from .outcome.diagnosis import Diagnosis
+from .starts.search_space import farthest
 from .verdict.notes import at_limits
-from .which.search_space import farthest
 
 WIDER, CLOSER = 5.0, 0.2
 """How many tolerances a further look takes for one."""

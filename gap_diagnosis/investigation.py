@@ -14,6 +14,11 @@ from fjr_kit.telling import Progress
 from fjr_records.periodic import RecordedExperiment, RecordedRealization
 from fjr_records.records import Record, RecordSet
 
+from .fits.cell_fits import DRIFT, CellFitter
+from .fits.comparison import NOTHING_LEFT, CellFit
+from .fits.estimates import moved_by_scatter, relative_scatter
+from .fits.gains import gain, stands_for
+from .fits.unseen_friction import SCATTER
 from .gates.bag_deviations import GROUPS
 from .gates.bags_gate import as_bags, drift_of_runs, run_changes, scattering
 from .how_far.ledger import Ledger
@@ -24,27 +29,23 @@ from .model.quasi_static import Stations
 from .model.record_length import within
 from .model.rig_model import Model
 from .model.steady_runs import SteadyRuns
-from .outcome.diagnosis import LEAST_PRESENT, Bags, Diagnosis
+from .outcome.cause import LEAST_PRESENT
+from .outcome.diagnosis import Bags, Diagnosis
 from .outcome.verdict_words import BACKWARDS, LOST, ROUNDING
+from .starts.catalogue import catalogue
+from .starts.search_space import TOLERANCE
 from .verdict.coarse_encoder import with_coarse_encoder
 from .verdict.contenders import contenders
 from .verdict.judgement import driven_backwards, judge, reproduced
 from .verdict.kept_causes import kept
 from .verdict.notes import of_fit, of_records, yielding
 from .verdict.tested_causes import Tested
-from .which.catalogue import catalogue
-from .which.cell_fits import DRIFT, CellFitter
-from .which.comparison import NOTHING_LEFT, CellFit
 from .which.equivalents import founded, partners
-from .which.estimates import moved_by_scatter, relative_scatter
 from .which.exchange import with_the_better_one
 from .which.found import Found
-from .which.gains import gain, stands_for
 from .which.rounding import beside_rounding
-from .which.search_space import TOLERANCE
 from .which.stepwise import Stepwise
 from .which.torque_timing import Timing, timed
-from .which.unseen_friction import SCATTER
 
 ASSUMED = (
     "How far friction scatters from run to run cannot be seen in these runs; the intervals allow "

@@ -13,6 +13,7 @@ import numpy as np
 from fjr_records.noise import even_lines_as_noise
 from fjr_records.periodic import RecordedExperiment
 
+from .fits.cell_fits import DRIFT
 from .gates.bags_gate import bags_gate, friction_follows_time
 from .gates.gate_checks import DISCRETISATION_LIMIT, GateReport, check_gates
 from .how_far.bla_gap import bla_gap
@@ -24,9 +25,8 @@ from .model.simulated_rig import Simulator
 from .model.steady_runs import compared, steady_runs
 from .next_experiment.choice import next_experiment
 from .outcome.diagnosis import Diagnosis, NextExperiment
+from .starts.catalogue import catalogue
 from .verdict.judgement import stopped
-from .which.catalogue import catalogue
-from .which.cell_fits import DRIFT
 from .which.drift_gate import drift_gate
 
 UNSTEADY = (

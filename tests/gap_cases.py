@@ -16,6 +16,7 @@ from fjr_records.periodic import RecordedExperiment, RecordedRealization
 from fjr_sim_node.plant import PLANT
 from fjr_sim_node.simulation.simulator import SIMULATOR, run_realization
 from gap_diagnosis.any_record import investigate
+from gap_diagnosis.fits.cell_fits import CellFitter
 from gap_diagnosis.gates.bag_changes import BagChanges
 from gap_diagnosis.gates.bags_gate import run_changes
 from gap_diagnosis.investigation import Fitted
@@ -23,8 +24,7 @@ from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.model.rig_model import Model
 from gap_diagnosis.model.steady_runs import steady_runs
 from gap_diagnosis.outcome.diagnosis import Diagnosis
-from gap_diagnosis.which.cell_fits import CellFitter
-from gap_diagnosis.which.search_space import TOLERANCE
+from gap_diagnosis.starts.search_space import TOLERANCE
 
 LEVELS_RAD = (2e-3, 7e-3, 2e-2)
 NOISE_RAD = 2e-5

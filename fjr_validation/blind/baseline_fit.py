@@ -17,18 +17,10 @@ from gap_diagnosis.any_record import read_any
 from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.model.parts import Purpose
 from gap_diagnosis.model.rig_model import Model
-from gap_diagnosis.outcome.diagnosis import (
-    Cause,
-    Diagnosis,
-    Estimate,
-    EvidenceKind,
-    Gap,
-    Gaps,
-    Stage,
-    Step,
-    Verdict,
-)
-from gap_diagnosis.which.scales import Scales
+from gap_diagnosis.outcome.cause import Cause
+from gap_diagnosis.outcome.diagnosis import Diagnosis, EvidenceKind, Stage, Step, Verdict
+from gap_diagnosis.outcome.gap_size import Estimate, Gap, Gaps
+from gap_diagnosis.starts.scales import Scales
 
 BUDGET_S = 120.0
 """Processor time of one method for one case, which other work on the machine does not take away;

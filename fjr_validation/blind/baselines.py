@@ -16,9 +16,10 @@ from pathlib import Path
 
 import numpy as np
 
-from gap_diagnosis.outcome.diagnosis import Diagnosis, Gap, Stage, Verdict
-from gap_diagnosis.which.catalogue import catalogue
-from gap_diagnosis.which.search_space import starts
+from gap_diagnosis.outcome.diagnosis import Diagnosis, Stage, Verdict
+from gap_diagnosis.outcome.gap_size import Gap
+from gap_diagnosis.starts.catalogue import catalogue
+from gap_diagnosis.starts.search_space import starts
 
 from .baseline_fit import Problem, fit, jacobian, verdict_of
 

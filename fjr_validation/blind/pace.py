@@ -17,7 +17,8 @@ from pathlib import Path
 import numpy as np
 
 from gap_diagnosis.model.parts import Purpose
-from gap_diagnosis.outcome.diagnosis import Diagnosis, Gap, Stage
+from gap_diagnosis.outcome.diagnosis import Diagnosis, Stage
+from gap_diagnosis.outcome.gap_size import Gap
 
 from .baseline_fit import MATTERS, Problem, verdict_of
 from .cma_fit import Free, cma_fit, factor_of

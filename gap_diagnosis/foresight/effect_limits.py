@@ -19,8 +19,8 @@ from fjr_sim_node import effects as fx
 
 from ..model.rig_model import Model
 from ..outcome.verdict_words import ROUNDING
-from ..which.candidates import by_shape
-from ..which.search_space import beside, starts
+from ..starts.candidates import by_shape
+from ..starts.search_space import beside, starts
 from .bare_parameters import left_by_refit
 from .foreseen import ForeseenEffect
 from .sight import Sight

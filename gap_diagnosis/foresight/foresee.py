@@ -13,9 +13,9 @@ from ..gates.gate_checks import check_gates
 from ..model.nominal import refuse_too_stiff
 from ..model.rig_model import Model
 from ..model.steady_runs import steady_runs
-from ..which.catalogue import catalogue
-from ..which.scales import Scales
-from ..which.search_space import TOLERANCE
+from ..starts.catalogue import catalogue
+from ..starts.scales import Scales
+from ..starts.search_space import TOLERANCE
 from .bare_parameters import bare_refit, parameters
 from .effect_limits import EffectLimits
 from .foreseen import ForeseenEffect, Foresight

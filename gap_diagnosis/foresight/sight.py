@@ -12,11 +12,11 @@ from scipy.stats import chi2
 
 from fjr_records.records import RecordSet
 
+from ..fits.comparison import CHANCE, NOTHING_LEFT
+from ..fits.gains import LEAST_GAIN
 from ..model.evidence import Evidence
 from ..model.rig_model import Model
-from ..which.comparison import CHANCE, NOTHING_LEFT
-from ..which.gains import LEAST_GAIN
-from ..which.scales import Scales
+from ..starts.scales import Scales
 
 _FARTHEST = 30.0  # logarithm of the factors within which a size is looked for
 RECORDS = 3

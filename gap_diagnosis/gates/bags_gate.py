@@ -11,7 +11,8 @@ from fjr_sim_node.plant import PLANT
 from ..model.evidence import Evidence
 from ..model.rig_model import Model
 from ..model.steady_runs import SteadyRuns
-from ..outcome.diagnosis import Bags, BagTrend, Estimate
+from ..outcome.diagnosis import Bags, BagTrend
+from ..outcome.gap_size import Estimate
 from .bag_changes import TREND_FALSE_ALARM, BagChanges, bag_changes, levels_agree
 from .bag_deviations import run_errors
 from .gate_checks import Gate, untested

@@ -22,7 +22,7 @@ from fjr_records.periodic import RecordedExperiment
 from fjr_records.spectra import line_spectrum
 
 from ..model.simulated_rig import Signals
-from ..outcome.diagnosis import StageFigures
+from ..outcome.gap_size import StageFigures
 from .bootstrap import Choice, stage_figures
 
 STAGES = ("nominal", "refit", "explained")

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..outcome.diagnosis import Figure, StageFigures
+from ..outcome.gap_size import Figure, StageFigures
 
 _DRAWS = 2000
 

@@ -9,7 +9,9 @@ import numpy as np
 
 from ..model.evidence import Evidence
 from ..model.rig_model import Model
-from ..outcome.diagnosis import Figure, Gap, Place, Remainder, Stage, StageFigures, Step
+from ..outcome.cause import Place
+from ..outcome.diagnosis import Remainder, Stage, Step
+from ..outcome.gap_size import Figure, Gap, StageFigures
 from ..where.remainder import looks_like
 from .bootstrap import Choice, stage_figures
 

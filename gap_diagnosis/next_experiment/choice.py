@@ -22,11 +22,11 @@ from fjr_records.periodic import RecordedExperiment
 from fjr_records.spectra import line_spectrum
 from fjr_sim_node.simulation.closed_loop import simulate
 
+from ..fits.comparison import CellFit
 from ..model.rig_model import Model
 from ..model.simulated_rig import last_samples, run_parallel
 from ..outcome.cause_words import tells
 from ..outcome.diagnosis import NextExperiment
-from ..which.comparison import CellFit
 from .trials import Trial, trials
 
 LEAST_SIGMA = 10.0

@@ -9,7 +9,9 @@ from fjr_interface.linear_axis import pitch_m
 from fjr_kit.number_text import unsigned_zero
 from fjr_sim_node import effects as fx
 
-from .diagnosis import Cause, Diagnosis, Estimate, EvidenceKind, Figure, Place
+from .cause import Cause, Place
+from .diagnosis import Diagnosis, EvidenceKind
+from .gap_size import Estimate, Figure
 from .verdict_words import explanation
 
 NOISE: dict[str, str] = {

@@ -8,7 +8,9 @@ from pydantic import Field
 
 from fjr_kit.result_types import Document, FreeForm, Number, OptionalNumber, ResultModel, Unit
 
+from .cause import Cause, Doubted, Place
 from .contender import Contender
+from .gap_size import Estimate, Gap, GapFigures, Gaps
 
 Verdict = Literal[
     "no_gap",
@@ -22,66 +24,6 @@ Verdict = Literal[
 ]
 ReportedOn = Literal["records", "blocks", "none"]
 Stage = Literal["nominal", "refit", "cause"]
-LEAST_PRESENT = 0.5
-"""A cause that is there less often than not is not called present."""
-LineKind = Literal["excited", "odd", "even", "dc", "slow", "all"]
-
-
-class Estimate(ResultModel):
-    """A parameter with its 95 % interval, in the unit that ends its name."""
-
-    value: Number
-    low: Number
-    high: Number
-
-
-class Gap(ResultModel):
-    """A distance between rig and simulation, on the data of `Diagnosis.reported_on`.
-
-    Attributes:
-        nrmse_position: rms of y error over rms of y.
-        nrmse_torque: rms of u error over rms of u.
-        chi2_per_dof: mean squared line error of y over its noise variance.
-    """
-
-    nrmse_position: OptionalNumber
-    nrmse_torque: OptionalNumber
-    chi2_per_dof: OptionalNumber
-
-
-class Gaps(ResultModel):
-    """The gaps: as delivered, after the refit, after the effect, and of the noise alone."""
-
-    nominal: Gap | None
-    refit: Gap | None
-    explained: Gap | None
-    noise_floor: Gap | None
-
-
-class Figure(ResultModel):
-    """A figure with its 95 % interval, which is None where a single part was looked at."""
-
-    value: Number
-    low: OptionalNumber
-    high: OptionalNumber
-
-
-class StageFigures(ResultModel):
-    """One figure at each stage, and the share of it that the effect closes.
-
-    Attributes:
-        nominal, refit, explained: of the simulation; None where it diverges.
-        noise_floor: what noise alone leaves; None where that is not known.
-        closed: 1 - (explained^2 - floor^2)/(refit^2 - floor^2); None without an effect, where the
-            refit leaves nothing that differs from noise, where the effect brings the simulation no
-            nearer, and for an effect that acts like noise.
-    """
-
-    nominal: Figure | None
-    refit: Figure | None
-    explained: Figure | None
-    noise_floor: Figure | None
-    closed: Figure | None
 
 
 class BagTrend(ResultModel):
@@ -111,72 +53,6 @@ class Bags(ResultModel):
     scatter_percent: dict[str, Estimate]
     accounted: Number
     scatter_known: bool = True
-
-
-class GapFigures(ResultModel):
-    """The gap with intervals, see `ledger` and `bla_gap` for what each figure is.
-
-    Attributes:
-        position: rms error over rms; None where torques were compared.
-        torque: rms error over rms; None where no run has a torque.
-        bla_sigma, distortion_db: of steady periods; None for records.
-    """
-
-    position: StageFigures | None = None
-    torque: StageFigures | None = None
-    bla_sigma: StageFigures | None = None
-    distortion_db: StageFigures | None = None
-
-
-class Place(ResultModel):
-    """Where the gap lies: a band of one level, one kind of line, one signal.
-
-    Records that are not periodic have no kinds of line but `slow` (mean and slow motion) and `all`.
-    Sigma is the rms error over the standard deviation of the noise; NaN where noise is not known.
-    """
-
-    level: int
-    band_hz: Annotated[tuple[float, float], Unit("Hz")]
-    lines: LineKind
-    signal: Literal["position", "torque", "twist"]
-    sigma: Number
-
-
-class Cause(ResultModel):
-    """An unmodelled effect that is present.
-
-    Attributes:
-        effect: its identifier.
-        others: effects that these data cannot tell from it.
-        present: probability that it, or one of the others, is there.
-        share: how much of the squared gap that the refit left comes back if the cause is left out
-            and all else is fitted anew.
-        invariance_p: how often chance alone makes its sizes differ so much between levels; None
-            where there is one level only.
-        where: where leaving it out shows most.
-        parameters: its parameters.
-    """
-
-    effect: str
-    others: list[str] = Field(default_factory=list, alias="or")
-    present: float = Field(ge=0.0, le=1.0)
-    share: Figure | None = None
-    invariance_p: OptionalNumber = None
-    where: list[Place] = Field(default_factory=list)
-    parameters: dict[str, Estimate] = Field(default_factory=dict)
-
-
-class Doubted(ResultModel):
-    """An effect that the search added and its tests took out again.
-
-    Attributes:
-        effect: its identifier.
-        present: probability that it is there nevertheless: up to one half, and more where only two
-            causes that gain more keep it from being named.
-    """
-
-    effect: str
-    present: float = Field(ge=0.0, le=1.0)
 
 
 class Step(ResultModel):

@@ -22,9 +22,10 @@ from ..outcome.cause_words import (
     place_words,
     share_words,
 )
-from ..outcome.diagnosis import Diagnosis, Estimate, Figure, Gap
+from ..outcome.diagnosis import Diagnosis
+from ..outcome.gap_size import Estimate, Figure, Gap
 from ..outcome.verdict_words import explains, explanation, unit_of
-from ..which.search_space import Space
+from ..starts.search_space import Space
 from .gap_level_plots import MODEL_STYLES
 from .updated_parameters import simulator_values
 

@@ -18,9 +18,10 @@ from fjr_interface.parameters import Parameter, ParameterGroup
 from fjr_sim_node import effects as fx
 from fjr_sim_node.plant import PLANT
 
+from ..fits.estimates import run_scatter
 from ..gates.bag_deviations import SCATTERING
-from ..outcome.diagnosis import Bags, Estimate
-from ..which.estimates import run_scatter
+from ..outcome.diagnosis import Bags
+from ..outcome.gap_size import Estimate
 
 _NORMAL_95 = 1.96
 _HEAD = """\

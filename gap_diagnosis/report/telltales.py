@@ -10,7 +10,7 @@ from fjr_kit.plots import PLAIN, Options, Plot, layout, linked, numbers, trace
 from fjr_sim_node.effects import EFFECTS, QUANTITIES
 
 from ..investigation import Fitted, Investigation
-from ..outcome.diagnosis import Cause
+from ..outcome.cause import Cause
 from ..outcome.verdict_words import explanation
 from ..where.telltale import Shown, shown, why_not
 

@@ -16,13 +16,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..fits.cell_fits import CellFitter
+from ..fits.comparison import NOTHING_LEFT, CellFit
 from ..how_far.ledger import Ledger
 from ..model.evidence import Evidence
 from ..model.rig_model import Model
-from ..outcome.diagnosis import Cause, Diagnosis, Estimate, GapFigures, Step
+from ..outcome.cause import Cause
+from ..outcome.diagnosis import Diagnosis, Step
+from ..outcome.gap_size import Estimate, GapFigures
 from ..outcome.verdict_words import ROUNDING
-from ..which.cell_fits import CellFitter
-from ..which.comparison import NOTHING_LEFT, CellFit
 from ..which.found import Found
 from ..which.rounding import STEP, step_of, with_step
 from .judgement import FEWEST_PARTS, PLAIN, gaps_of, verdict_of

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from ..fits.cell_fits import CellFitter
+from ..fits.comparison import CellFit
+from ..fits.gains import gain
 from ..outcome.contender import Contender
-from ..which.cell_fits import CellFitter
-from ..which.comparison import CellFit
 from ..which.found import Found
-from ..which.gains import gain
 
 
 def contenders(fitter: CellFitter, found: Found, tied: Sequence[CellFit]) -> list[Contender]:

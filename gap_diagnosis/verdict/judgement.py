@@ -9,30 +9,19 @@ import numpy as np
 
 from fjr_records.driven import goes_backwards
 
+from ..fits.cell_fits import CellFitter
+from ..fits.comparison import NOTHING_LEFT, CellFit
+from ..fits.estimates import linear_estimates, standard_errors
+from ..fits.gains import gain
 from ..gates.gate_checks import GateReport
 from ..how_far.ledger import Ledger
 from ..model.evidence import Evidence
 from ..model.rig_model import Model
 from ..model.steady_runs import SteadyRuns
-from ..outcome.diagnosis import (
-    Bags,
-    Candidate,
-    Cause,
-    Diagnosis,
-    Doubted,
-    Estimate,
-    EvidenceKind,
-    Gap,
-    GapFigures,
-    Gaps,
-    Step,
-    Verdict,
-)
-from ..which.cell_fits import CellFitter
-from ..which.comparison import NOTHING_LEFT, CellFit
-from ..which.estimates import linear_estimates, standard_errors
+from ..outcome.cause import Cause, Doubted
+from ..outcome.diagnosis import Bags, Candidate, Diagnosis, EvidenceKind, Step, Verdict
+from ..outcome.gap_size import Estimate, Gap, GapFigures, Gaps
 from ..which.found import Found
-from ..which.gains import gain
 from ..which.presence import (
     cell_estimates,
     where_it_acts,

@@ -11,13 +11,13 @@ from dataclasses import replace
 from fjr_kit.telling import Progress
 from fjr_sim_node import effects as fx
 
-from ..outcome.diagnosis import LEAST_PRESENT
-from ..which.cell_fits import CellFitter
-from ..which.comparison import CellFit
+from ..fits.cell_fits import CellFitter
+from ..fits.comparison import CellFit
+from ..fits.gains import NEARLY_ALL, gain, left_of, stands_for
+from ..outcome.cause import LEAST_PRESENT
+from ..starts.seen_together import lacked
 from ..which.equivalents import founded, partners
 from ..which.found import Found
-from ..which.gains import NEARLY_ALL, gain, left_of, stands_for
-from ..which.seen_together import lacked
 from .judgement import FEWEST_PARTS
 from .not_named import unsure, why_not
 from .tested_causes import Tested, causes_with_tests

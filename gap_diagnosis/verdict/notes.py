@@ -10,15 +10,15 @@ import numpy as np
 from fjr_records.driven import opposes, wrong_sign
 from fjr_sim_node import effects as fx
 
+from ..fits.comparison import NOTHING_LEFT
 from ..model.evidence import Evidence
 from ..model.rig_model import Model
 from ..model.twist import doubt_of, goes_along
 from ..outcome.verdict_words import OUT_OF_TIME, ROUNDING, SWINGS_FREE, TWISTS
-from ..which.comparison import NOTHING_LEFT
+from ..starts.other_splits import YIELDS
+from ..starts.search_space import Space
 from ..which.found import Found
-from ..which.other_splits import YIELDS
 from ..which.presence import over_usual
-from ..which.search_space import Space
 
 _SHOWN = 3
 """Most runs of which the same is said."""

@@ -8,11 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..fits.cell_fits import CellFitter
+from ..fits.comparison import CellFit
+from ..fits.gains import LEAST_GAIN, MOST_P, Gain, beside_others, closed, fall, gain
 from ..how_far.ledger import Ledger
-from ..outcome.diagnosis import LEAST_PRESENT, Figure
-from ..which.cell_fits import CellFitter
-from ..which.comparison import CellFit
-from ..which.gains import LEAST_GAIN, MOST_P, Gain, beside_others, closed, fall, gain
+from ..outcome.cause import LEAST_PRESENT
+from ..outcome.gap_size import Figure
+from ..starts.ripples_passed import doubt_of_shape, ripples_passed
 from ..which.presence import (
     LEAST_INVARIANCE_P,
     SAME_WORTH,
@@ -23,7 +25,6 @@ from ..which.presence import (
     invariance,
     over_usual,
 )
-from ..which.ripples_passed import doubt_of_shape, ripples_passed
 
 LEAST_IN_BAND = 0.8
 """Of what is left in its best band, what a cause must close if its share of all is not certain."""

@@ -19,7 +19,7 @@ from fjr_records.noise import NoiseLevels
 from fjr_records.periodic import RecordedExperiment
 from fjr_records.spectra import line_spectrum
 
-from ..outcome.diagnosis import LineKind, Place
+from ..outcome.cause import LineKind, Place
 
 Signal = Literal["position", "torque"]
 

@@ -11,12 +11,12 @@ from dataclasses import replace
 
 from fjr_records.records import RecordSet
 
+from ..fits.cell_fits import DRIFT, CellFitter
+from ..fits.comparison import CellFit
+from ..fits.gains import MOST_P, Gain, closed, gain
 from ..gates.gate_checks import Gate
 from ..model.evidence import Evidence
 from ..model.rig_model import Model
-from .cell_fits import DRIFT, CellFitter
-from .comparison import CellFit
-from .gains import MOST_P, Gain, closed, gain
 from .stepwise import LEAST_CLOSED
 
 _NAME = f"{DRIFT}.friction_per_s"

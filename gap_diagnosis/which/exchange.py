@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from .cell_fits import CellFitter
-from .comparison import CellFit
+from ..fits.cell_fits import CellFitter
+from ..fits.comparison import CellFit
+from ..fits.gains import gain, stands_for
 from .extension import Extension
 from .found import Found
-from .gains import gain, stands_for
 from .presence import at_its_bound
 
 _FEWEST = 3

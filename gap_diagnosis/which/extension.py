@@ -9,14 +9,14 @@ import numpy as np
 from fjr_kit.telling import Progress
 from fjr_sim_node import effects as fx
 
-from .cell_fits import STICKING, CellFitter
-from .comparison import NOTHING_LEFT, CellFit
+from ..fits.cell_fits import STICKING, CellFitter
+from ..fits.comparison import NOTHING_LEFT, CellFit
+from ..fits.gains import NEARLY_ALL, Gain, gain, left_of, likelihood, stands_for
+from ..starts.screening import Proposal, Screening
+from ..starts.seen_together import LACKED, lacked
 from .equivalents import ONE_CAUSE, founded, holders, partners, plainness
 from .friction_left import FRICTION
-from .gains import NEARLY_ALL, Gain, gain, left_of, likelihood, stands_for
 from .polish import MOST, MUCH_LESS, OUTDATED, Polish, ranked
-from .screening import Proposal, Screening
-from .seen_together import LACKED, lacked
 
 _PROPOSED, _FITTED, _STARTS = (7, 5), (5, 3), (2, 1)
 """Effects that are tried at several sizes, those of them that are fitted, and from how many starts:

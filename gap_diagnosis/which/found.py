@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from .comparison import CellFit
+from ..fits.comparison import CellFit
 
 
 @dataclass

@@ -6,9 +6,9 @@ import numpy as np
 
 from fjr_sim_node import effects as fx
 
+from ..fits.cell_fits import CellFitter
+from ..fits.comparison import CellFit
 from ..where.remainder import share_of_velocity
-from .cell_fits import CellFitter
-from .comparison import CellFit
 
 FRICTION = tuple(effect.identifier for effect in fx.FRICTION)
 """Effects that are laws of friction."""

@@ -6,11 +6,11 @@ from collections.abc import Callable, Sequence
 
 from fjr_sim_node import effects as fx
 
-from .cell_fits import CellFitter
-from .comparison import CellFit
+from ..fits.cell_fits import CellFitter
+from ..fits.comparison import CellFit
+from ..fits.gains import closed, gain, left_of
+from ..fits.harmonics import WORTH_A_HARMONIC, with_second_harmonic
 from .equivalents import partners
-from .gains import closed, gain, left_of
-from .harmonics import WORTH_A_HARMONIC, with_second_harmonic
 
 _POLISHED = 2  # leading fits of a step that are taken further
 OUTDATED = 0.1  # of the squared error that is left: then what was screened before is too far

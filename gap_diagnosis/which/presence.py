@@ -16,11 +16,9 @@ from scipy import stats
 
 from fjr_sim_node import effects as fx
 
-from ..model.rig_model import Model
-from ..outcome.diagnosis import Estimate
-from .cell_fits import CellFitter
-from .comparison import NOTHING_LEFT, CellFit
-from .estimates import (
+from ..fits.cell_fits import CellFitter
+from ..fits.comparison import NOTHING_LEFT, CellFit
+from ..fits.estimates import (
     FORM,
     FORM_BESIDE,
     NORMAL_95,
@@ -32,7 +30,9 @@ from .estimates import (
     standard_errors,
     together_sure,
 )
-from .gains import fall
+from ..fits.gains import fall
+from ..model.rig_model import Model
+from ..outcome.gap_size import Estimate
 
 LEAST_INVARIANCE_P = 0.01
 SAME_WORTH = 0.01

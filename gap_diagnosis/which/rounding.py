@@ -19,13 +19,13 @@ import numpy as np
 
 from fjr_kit.telling import Progress
 
+from ..fits.cell_fits import CellFitter
+from ..fits.comparison import NOTHING_LEFT, CellFit
 from ..model.evidence import Evidence
 from ..model.lapped import lapped
 from ..model.rig_model import Model
 from ..model.simulated_rig import run_parallel
 from ..outcome.verdict_words import ROUNDING
-from .cell_fits import CellFitter
-from .comparison import NOTHING_LEFT, CellFit
 from .found import Found
 
 STEP = f"{ROUNDING}.resolution_rad"

@@ -12,14 +12,14 @@ from collections.abc import Callable, Sequence
 
 from fjr_kit.telling import Progress
 
-from .cell_fits import CellFitter
-from .comparison import NOTHING_LEFT, CellFit
+from ..fits.cell_fits import CellFitter
+from ..fits.comparison import NOTHING_LEFT, CellFit
+from ..fits.gains import closed, left_of
+from ..starts.seen_together import LACKED, lacked
 from .exchange import drop_hindering, replace_bounded
 from .extension import Extension
 from .found import Found
 from .friction_left import FRICTION, lacks_friction
-from .gains import closed, left_of
-from .seen_together import LACKED, lacked
 
 MOST_CAUSES = 5
 _PARENTS = 3  # leading fits beside which a second cause is looked for

@@ -12,12 +12,12 @@ from dataclasses import dataclass, replace
 from fjr_kit.telling import Progress
 from fjr_records.records import RecordSet
 
+from ..fits.cell_fits import CellFitter
+from ..fits.comparison import CellFit
+from ..fits.gains import gain, stands_for
 from ..model.evidence import Evidence
 from ..model.record_torque import CONTINUOUS, with_continuous_torque
 from ..model.rig_model import Model
-from .cell_fits import CellFitter
-from .comparison import CellFit
-from .gains import gain, stands_for
 
 _IS_HELD = 0.2
 """Of a sample: how far from half a sample may lie what comes late of a signal that is held."""

@@ -14,21 +14,10 @@ from fjr_bringup.replay.comparison import Difference
 from fjr_bringup.replay.publishing import Published, PublishedTopic
 from fjr_cli import analysis_summary, diagnosis_summary
 from fjr_cli.replay_summary import print_differences, print_published
+from gap_diagnosis.outcome.cause import Cause, Place
 from gap_diagnosis.outcome.contender import Contender
-from gap_diagnosis.outcome.diagnosis import (
-    Cause,
-    Diagnosis,
-    Estimate,
-    EvidenceKind,
-    Figure,
-    Gap,
-    GapFigures,
-    Gaps,
-    Place,
-    Remainder,
-    StageFigures,
-    Step,
-)
+from gap_diagnosis.outcome.diagnosis import Diagnosis, EvidenceKind, Remainder, Step
+from gap_diagnosis.outcome.gap_size import Estimate, Figure, Gap, GapFigures, Gaps, StageFigures
 
 WIDTHS = (40, 60, 80)
 

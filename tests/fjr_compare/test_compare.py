@@ -17,7 +17,9 @@ from fjr_compare.comparing import judged_pairs
 from fjr_compare.diagnoses import compared_diagnoses
 from fjr_kit.errors import InputError
 from gap_diagnosis.gates.bag_deviations import SCATTERING
-from gap_diagnosis.outcome.diagnosis import Bags, Cause, Diagnosis, Estimate, Gap, Gaps
+from gap_diagnosis.outcome.cause import Cause
+from gap_diagnosis.outcome.diagnosis import Bags, Diagnosis
+from gap_diagnosis.outcome.gap_size import Estimate, Gap, Gaps
 
 TRUTH = {"jm": 0.2, "j": 0.3, "k0": 1500.0, "fs": 5.0, "fsm": 6.0, "fv": 4.0}
 STD = 0.005  # relative

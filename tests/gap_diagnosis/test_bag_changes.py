@@ -9,7 +9,8 @@ from gap_cases import changes_of, simulate_case, vary
 from gap_diagnosis.any_record import investigate
 from gap_diagnosis.gates.bag_changes import TREND_FALSE_ALARM
 from gap_diagnosis.gates.bags_gate import as_bags, bags_gate, scattering
-from gap_diagnosis.outcome.diagnosis import Bags, Diagnosis, Estimate
+from gap_diagnosis.outcome.diagnosis import Bags, Diagnosis
+from gap_diagnosis.outcome.gap_size import Estimate
 
 FRICTION = ("fs", "fsm", "fv", "fvm")
 

@@ -9,15 +9,15 @@ import pytest
 from test_evidence import NOMINAL, records
 
 from gap_diagnosis.any_record import investigate
+from gap_diagnosis.fits.cell_fits import CellFitter
+from gap_diagnosis.fits.gains import left_of
 from gap_diagnosis.investigation import Investigation, Order, investigate_runs
 from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.outcome.verdict_words import LOST
-from gap_diagnosis.which.cell_fits import CellFitter
 from gap_diagnosis.which.equivalents import founded
 from gap_diagnosis.which.exchange import replace_bounded
 from gap_diagnosis.which.extension import Extension
 from gap_diagnosis.which.found import Found
-from gap_diagnosis.which.gains import left_of
 from gap_diagnosis.which.presence import LEAST_INVARIANCE_P, at_its_bound, invariance
 
 BARE = {**NOMINAL, "fs": 0.0, "fsm": 0.0, "fv": 0.0, "fvm": 0.0}

@@ -13,13 +13,14 @@ from fjr_records.importers.importer import import_files
 from fjr_records.importers.record_file import ImportOptions
 from fjr_records.records import read_records
 from fjr_sim_node.simulation.closed_loop import simulate_law
+from gap_diagnosis.fits.cell_fits import CellFitter
 from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.model.nominal import datasheet
 from gap_diagnosis.model.record_rig import _NOTHING
 from gap_diagnosis.model.rig_model import Model
-from gap_diagnosis.outcome.diagnosis import Diagnosis, Estimate, Gaps
+from gap_diagnosis.outcome.diagnosis import Diagnosis
+from gap_diagnosis.outcome.gap_size import Estimate, Gaps
 from gap_diagnosis.report.gap_tables import parameters
-from gap_diagnosis.which.cell_fits import CellFitter
 from gap_diagnosis.which.found import Found
 from gap_diagnosis.which.stepwise import Stepwise
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from gap_diagnosis.outcome.cause import Cause, Place
 from gap_diagnosis.outcome.cause_words import (
     NO_SHARE,
     choice_sentences,
@@ -13,7 +14,8 @@ from gap_diagnosis.outcome.cause_words import (
     tells,
 )
 from gap_diagnosis.outcome.contender import Contender
-from gap_diagnosis.outcome.diagnosis import Cause, Diagnosis, Figure, Gaps, Place, Step
+from gap_diagnosis.outcome.diagnosis import Diagnosis, Step
+from gap_diagnosis.outcome.gap_size import Figure, Gaps
 
 
 @pytest.mark.parametrize(

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from gap_cases import SHORT, fitter_of, simulate_case
 
+from fjr_kit.least_squares import Solution
+from gap_diagnosis.fits.comparison import CellFit
+from gap_diagnosis.fits.estimates import form, kept_from_zero, linear_estimates, standard_errors
 from gap_diagnosis.model.rig_model import Model
 from gap_diagnosis.outcome.cause_words import digits, percent
-from gap_diagnosis.outcome.diagnosis import Estimate
-from gap_diagnosis.which.comparison import CellFit
-from gap_diagnosis.which.estimates import form, kept_from_zero, linear_estimates, standard_errors
-from gap_diagnosis.which.least_squares import Solution
+from gap_diagnosis.outcome.gap_size import Estimate
+from gap_diagnosis.starts.search_space import Space
 from gap_diagnosis.which.presence import beyond_zero, cell_estimates
-from gap_diagnosis.which.search_space import Space
 
 LINES, GROUPS = 600, 12
 AT = np.linspace(0.0, 1.0, LINES)

@@ -14,16 +14,16 @@ from fjr_records.records import Record, RecordSet
 from fjr_sim_node import effects as fx
 from fjr_sim_node.plant import PLANT, coefficients
 from fjr_sim_node.simulation.closed_loop import simulate
+from gap_diagnosis.fits import unseen_friction
+from gap_diagnosis.fits.cell_fits import CellFitter
+from gap_diagnosis.fits.cell_weights import independent
+from gap_diagnosis.fits.gains import Gain, closed, fall, gain
 from gap_diagnosis.gates.bag_deviations import GROUPS
 from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.model.rig_model import Model
-from gap_diagnosis.outcome.diagnosis import Figure
+from gap_diagnosis.outcome.gap_size import Figure
 from gap_diagnosis.verdict.notes import at_limits
 from gap_diagnosis.verdict.tested_causes import causes_with_tests
-from gap_diagnosis.which import unseen_friction
-from gap_diagnosis.which.cell_fits import CellFitter
-from gap_diagnosis.which.cell_weights import independent
-from gap_diagnosis.which.gains import Gain, closed, fall, gain
 from gap_diagnosis.which.presence import at_its_bound, beyond_zero, cell_estimates, invariance
 from gap_diagnosis.which.stepwise import LEAST_CLOSED, Stepwise
 
@@ -179,7 +179,7 @@ def test_what_closes_nearly_all_of_the_error_must_repeat_where_that_is(left, pre
 
 
 def test_a_leading_fit_is_taken_to_its_end_before_it_is_compared(monkeypatch):
-    monkeypatch.setattr("gap_diagnosis.which.cell_fits._ADDED_ROUNDS", (3,))
+    monkeypatch.setattr("gap_diagnosis.fits.cell_fits._ADDED_ROUNDS", (3,))
     limit = {"torque_saturation.limit_nm": 60.0}
     evidence = Evidence(records(limit, runs=2, seconds=5.0, scatter=0.02), NOMINAL)
     fitter = CellFitter(evidence, NOMINAL, 0.1)

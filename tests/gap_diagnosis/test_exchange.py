@@ -7,8 +7,8 @@ from dataclasses import replace
 import pytest
 from test_evidence import NOMINAL, records
 
+from gap_diagnosis.fits.cell_fits import CellFitter
 from gap_diagnosis.model.evidence import Evidence
-from gap_diagnosis.which.cell_fits import CellFitter
 from gap_diagnosis.which.exchange import drop_hindering, with_the_better_one
 from gap_diagnosis.which.extension import Extension
 from gap_diagnosis.which.found import Found

@@ -9,9 +9,12 @@ from dataclasses import replace
 import pytest
 from test_evidence import NOMINAL, SCATTER, records
 
+from gap_diagnosis.fits.cell_fits import CellFitter
+from gap_diagnosis.fits.gains import Gain, beside_others
 from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.model.rig_model import Model
-from gap_diagnosis.outcome.diagnosis import LEAST_PRESENT, Estimate
+from gap_diagnosis.outcome.cause import LEAST_PRESENT
+from gap_diagnosis.outcome.gap_size import Estimate
 from gap_diagnosis.verdict import kept_causes as kept_causes_module
 from gap_diagnosis.verdict.kept_causes import (
     LEAST_BEARING,
@@ -30,9 +33,7 @@ from gap_diagnosis.verdict.not_named import _bent, _changing, _kin
 from gap_diagnosis.verdict.notes import unusual
 from gap_diagnosis.verdict.tested_causes import causes_with_tests
 from gap_diagnosis.which import stepwise
-from gap_diagnosis.which.cell_fits import CellFitter
 from gap_diagnosis.which.found import Found
-from gap_diagnosis.which.gains import Gain, beside_others
 from gap_diagnosis.which.presence import beyond_zero, over_usual
 
 BOTH = ("coulomb_friction", "viscous_friction")

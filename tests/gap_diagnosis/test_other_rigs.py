@@ -20,12 +20,12 @@ from gap_diagnosis.model.prediction import crossover_hz, lead, observer
 from gap_diagnosis.model.rig_model import Model
 from gap_diagnosis.model.simulated_rig import Simulator
 from gap_diagnosis.report.updated_parameters import simulator_values
+from gap_diagnosis.starts.catalogue import catalogue
+from gap_diagnosis.starts.scales import Scales
+from gap_diagnosis.starts.search_space import starts
+from gap_diagnosis.starts.seen_together import LACKED, LAWS, LOADS
 from gap_diagnosis.where.residual_map import residual_map
-from gap_diagnosis.which.catalogue import catalogue
 from gap_diagnosis.which.equivalents import partners
-from gap_diagnosis.which.scales import Scales
-from gap_diagnosis.which.search_space import starts
-from gap_diagnosis.which.seen_together import LACKED, LAWS, LOADS
 
 NOMINAL = PLANT.defaults()
 LEAD_WITH_INTEGRATOR = {

@@ -12,13 +12,13 @@ from fjr_interface.experiment import RecordDescription
 from fjr_records.records import Record, RecordSet
 from fjr_sim_node import plant
 from fjr_sim_node.simulation import closed_loop
+from gap_diagnosis.fits.cell_fits import CellFitter
 from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.model.record_torque import (
     CONTINUOUS,
     mean_over_samples,
     with_continuous_torque,
 )
-from gap_diagnosis.which.cell_fits import CellFitter
 from gap_diagnosis.which.torque_timing import Timing, timed
 
 RATE, FINER = 200.0, 10

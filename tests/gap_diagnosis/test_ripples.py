@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from test_evidence import NOMINAL, RATE, records
 
+from gap_diagnosis.fits.cell_fits import CellFitter
 from gap_diagnosis.model.evidence import Evidence
-from gap_diagnosis.which.cell_fits import CellFitter
-from gap_diagnosis.which.ripples import _averaged
+from gap_diagnosis.starts.ripples import _averaged
 from gap_diagnosis.which.stepwise import Stepwise
 
 CASES = {

@@ -12,21 +12,22 @@ from hypothesis import strategies as st
 
 from controller_node import pd_filtered
 from fjr_interface.experiment import RecordDescription
+from fjr_kit.least_squares import Solution
 from fjr_records.records import Record, RecordSet
 from fjr_sim_node import effects as fx
 from fjr_sim_node.plant import PLANT, coefficients
 from fjr_sim_node.simulation.closed_loop import simulate
 from fjr_sim_node.simulation.simulator import SIMULATOR
+from gap_diagnosis.fits.comparison import CellFit
+from gap_diagnosis.fits.estimates import moved_by_scatter
 from gap_diagnosis.gates.bag_deviations import deviations, run_errors
 from gap_diagnosis.gates.bags_gate import as_bags, drift_of_runs, run_changes, scattering
 from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.model.rig_model import Model
-from gap_diagnosis.outcome.diagnosis import Bags, Estimate
+from gap_diagnosis.outcome.diagnosis import Bags
+from gap_diagnosis.outcome.gap_size import Estimate
 from gap_diagnosis.report.randomisation import randomisation_yaml, ranges
-from gap_diagnosis.which.comparison import CellFit
-from gap_diagnosis.which.estimates import moved_by_scatter
-from gap_diagnosis.which.least_squares import Solution
-from gap_diagnosis.which.search_space import Space
+from gap_diagnosis.starts.search_space import Space
 
 RATE_HZ = 500.0
 LAW = pd_filtered.CONTROLLER.check({"sample_rate_hz": RATE_HZ})

@@ -6,14 +6,14 @@ import numpy as np
 from test_evidence import NOMINAL as RIG
 from test_evidence import records
 
+from fjr_kit.least_squares import Solution
 from fjr_sim_node.plant import PLANT
+from gap_diagnosis.fits.cell_fits import CellFitter
 from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.model.rig_model import Model
-from gap_diagnosis.which.cell_fits import CellFitter
+from gap_diagnosis.starts.screening import LARGEST, Screening
+from gap_diagnosis.starts.search_space import Space
 from gap_diagnosis.which.extension import Extension
-from gap_diagnosis.which.least_squares import Solution
-from gap_diagnosis.which.screening import LARGEST, Screening
-from gap_diagnosis.which.search_space import Space
 
 NOMINAL = PLANT.defaults()
 HALF = 50

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from fjr_sim_node import effects as fx
 from fjr_sim_node.plant import PLANT
-from gap_diagnosis.which.scales import Scales
-from gap_diagnosis.which.search_space import Space, space_for, starts
+from gap_diagnosis.starts.scales import Scales
+from gap_diagnosis.starts.search_space import Space, space_for, starts
 
 PAPER_LIKE = Scales(
     torque_nm=150.0, velocity_rad_s=8.0, angle_rad=0.065, deflection_rad=0.1,

@@ -21,7 +21,7 @@ from fjr_sim_node.simulation.closed_loop import simulate_law
 from gap_diagnosis.any_record import diagnose, investigate
 from gap_diagnosis.model.nominal import datasheet
 from gap_diagnosis.model.rig_model import Model
-from gap_diagnosis.which.seen_together import LOADS, Seen, lacked, load_parameters, solved
+from gap_diagnosis.starts.seen_together import LOADS, Seen, lacked, load_parameters, solved
 
 EVERY = ("coulomb_friction", "viscous_friction", "load_friction", *LOADS)
 BARE = Model.nominal(datasheet({"jm": 2.0}, "joint"))

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from test_evidence import NOMINAL, records
 
+from gap_diagnosis.fits.cell_fits import CellFitter
 from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.model.record_rig import RecordSimulator
 from gap_diagnosis.model.rig_model import Model
-from gap_diagnosis.which.cell_fits import CellFitter
-from gap_diagnosis.which.seen_torques import SeenTorques, _best
+from gap_diagnosis.starts.seen_torques import SeenTorques, _best
 
 CASES = {
     "cogging": {"amplitude_nm": 6.0, "cycles_per_turn": 45.0, "phase_rad": 0.7},

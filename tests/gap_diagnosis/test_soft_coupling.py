@@ -16,8 +16,8 @@ from fjr_records.records import Record, RecordSet
 from gap_diagnosis.any_record import investigate
 from gap_diagnosis.investigation import Investigation
 from gap_diagnosis.model.nominal import datasheet
+from gap_diagnosis.starts.other_splits import other_splits
 from gap_diagnosis.verdict.notes import yielding
-from gap_diagnosis.which.other_splits import other_splits
 
 RATE, SECONDS, SUBSTEPS = 500, 20, 20
 MOTOR, DISC, STIFFNESS = 2.3e-3, 1.0e-3, 18.0

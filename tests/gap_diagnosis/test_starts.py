@@ -8,11 +8,11 @@ from gap_cases import SHORT, fitter_of, simulate_case
 from test_evidence import NOMINAL, records
 
 from fjr_sim_node.effects import EFFECTS
+from gap_diagnosis.fits.cell_fits import CellFitter
+from gap_diagnosis.fits.comparison import CellFit
 from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.model.rig_model import Model
 from gap_diagnosis.model.simulated_rig import Simulator
-from gap_diagnosis.which.cell_fits import CellFitter
-from gap_diagnosis.which.comparison import CellFit
 
 pytestmark = pytest.mark.slow
 

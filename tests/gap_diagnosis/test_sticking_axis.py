@@ -19,13 +19,13 @@ from fjr_sim_node import effects as fx
 from fjr_sim_node.plant import coefficients
 from fjr_sim_node.simulation.closed_loop import simulate_law
 from gap_diagnosis.any_record import investigate
+from gap_diagnosis.fits.cell_fits import STICKING, CellFitter
+from gap_diagnosis.fits.gains import gain, likelihood
 from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.model.nominal import datasheet
 from gap_diagnosis.model.rig_model import Model
-from gap_diagnosis.which.cell_fits import STICKING, CellFitter
+from gap_diagnosis.starts.seen_torques import SeenTorques
 from gap_diagnosis.which.extension import Extension
-from gap_diagnosis.which.gains import gain, likelihood
-from gap_diagnosis.which.seen_torques import SeenTorques
 
 RATE, SECONDS, INERTIA = 500.0, 12.0, 2.0
 AXIS = {"jm": INERTIA, "j": 0.0, "fs": 0.0, "fsm": 9.0, "fv": 0.0, "fvm": 6.0, "k0": math.inf,

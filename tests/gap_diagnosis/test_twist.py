@@ -21,7 +21,7 @@ from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.model.nominal import datasheet
 from gap_diagnosis.model.rig_model import Model
 from gap_diagnosis.outcome.verdict_words import TWISTS
-from gap_diagnosis.which.seen_twist import play
+from gap_diagnosis.starts.seen_twist import play
 
 RATE, STEPS = 500.0, 40
 TRUE = {"jm": 0.02, "j": 0.03, "k0": 180.0}

@@ -8,11 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_evidence import NOMINAL, records
 
+from gap_diagnosis.fits.cell_fits import CellFitter
+from gap_diagnosis.fits.gains import gain
+from gap_diagnosis.fits.unseen_friction import SCATTER, beside_scatter, deviated
 from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.model.rig_model import Model
-from gap_diagnosis.which.cell_fits import CellFitter
-from gap_diagnosis.which.gains import gain
-from gap_diagnosis.which.unseen_friction import SCATTER, beside_scatter, deviated
 
 STEP = 0.01
 
@@ -72,7 +72,7 @@ def test_a_small_offset_is_there_on_runs_whose_friction_differs(monkeypatch):
     bias, shown = {"torque_bias.torque_nm": 0.01}, {True: 0, False: 0}
     for beside in shown:
         if not beside:
-            monkeypatch.setattr("gap_diagnosis.which.comparison.deviated", lambda model: [])
+            monkeypatch.setattr("gap_diagnosis.fits.comparison.deviated", lambda model: [])
         for seed in range(4):
             evidence = Evidence(records(bias, runs=2, scatter=0.05, seed=seed), NOMINAL)
             fitter = CellFitter(evidence, NOMINAL, 0.1)
@@ -91,6 +91,6 @@ def test_few_parts_show_an_effect_if_all_of_them_do(gains, there, monkeypatch):
     change = np.zeros(24)
     change[: len(gains)] = gains
     monkeypatch.setattr(CellFitter, "gains", lambda self, after, before: change)
-    monkeypatch.setattr("gap_diagnosis.which.gains.left_of", lambda *_: 1.0)
+    monkeypatch.setattr("gap_diagnosis.fits.gains.left_of", lambda *_: 1.0)
     fitter = object.__new__(CellFitter)
     assert gain(fitter, None, None, change != 0.0).present == there

@@ -19,6 +19,8 @@ from fjr_sim_node import effects as fx
 from fjr_sim_node.plant import PLANT, coefficients
 from fjr_sim_node.simulation.closed_loop import simulate, simulate_law
 from gap_diagnosis.any_record import investigate
+from gap_diagnosis.fits.cell_fits import DRIFT, CellFitter
+from gap_diagnosis.fits.gains import gain
 from gap_diagnosis.gates.bags_gate import friction_follows_time
 from gap_diagnosis.gates.gate_checks import check_gates
 from gap_diagnosis.model.evidence import Evidence
@@ -28,8 +30,6 @@ from gap_diagnosis.outcome.diagnosis import Diagnosis
 from gap_diagnosis.report.gap_output import write_diagnosis
 from gap_diagnosis.report.updated_parameters import updated_values
 from gap_diagnosis.steady_periods import NOTHING_NAMED, UNSTEADY
-from gap_diagnosis.which.cell_fits import DRIFT, CellFitter
-from gap_diagnosis.which.gains import gain
 
 WARMING = {"nonstationary.friction_per_s": -0.02}
 LAG_S = 1e-3

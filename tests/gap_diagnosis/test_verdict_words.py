@@ -4,14 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from gap_diagnosis.outcome.diagnosis import (
-    Candidate,
-    Diagnosis,
-    EvidenceKind,
-    Gap,
-    Gaps,
-    NextExperiment,
-)
+from gap_diagnosis.outcome.diagnosis import Candidate, Diagnosis, EvidenceKind, NextExperiment
+from gap_diagnosis.outcome.gap_size import Gap, Gaps
 from gap_diagnosis.outcome.verdict_words import (
     OUT_OF_TIME,
     action,

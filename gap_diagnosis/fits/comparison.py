@@ -12,11 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
+from fjr_kit.least_squares import Solution
+
 from ..model.evidence import Evidence
 from ..model.rig_model import Model
+from ..starts.search_space import Space
 from .cell_weights import CellWeights
-from .least_squares import Solution
-from .search_space import Space
 from .unseen_friction import beside_scatter, deviated
 
 NOTHING_LEFT = 2.0

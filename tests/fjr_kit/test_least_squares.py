@@ -7,7 +7,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from gap_diagnosis.which.least_squares import solve
+from fjr_kit.least_squares import solve
 
 FREE = np.full(2, -10.0), np.full(2, 10.0)
 

@@ -16,13 +16,13 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
+from fjr_kit.least_squares import Solution
 from fjr_sim_node import effects as fx
 from fjr_sim_node.theory.linear import g0
 
 from ..model.evidence import Evidence
 from ..model.rig_model import Model
 from ..model.steady_runs import SteadyRuns
-from .least_squares import Solution
 
 MOST_TRIED = 240
 _LEAST_FIRST = 0.1  # of the second harmonic: a smaller first one is no ripple of that number

@@ -10,9 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fjr_kit.least_squares import Solution
 from fjr_sim_node import effects as fx
-
-from .least_squares import Solution
 
 Costs = Callable[[np.ndarray], np.ndarray]
 """Takes errors, (models, errors) in standard deviations; returns what each costs, (models,)."""

@@ -14,15 +14,15 @@ from dataclasses import replace
 
 import numpy as np
 
+from fjr_kit.least_squares import solve
 from fjr_sim_node import effects as fx
 
 from ..model.evidence import Evidence
 from ..model.rig_model import Model
+from ..starts.other_splits import other_splits
+from ..starts.scales import Scales
+from ..starts.search_space import Space
 from .comparison import NOTHING_LEFT, CellFit, Comparison
-from .least_squares import solve
-from .other_splits import other_splits
-from .scales import Scales
-from .search_space import Space
 
 _REFIT_ROUNDS = (8, 5, 5)
 _FURTHER = 4  # times that a fit is taken further at the most

@@ -16,16 +16,16 @@ from fjr_sim_node import effects as fx
 
 from ..model.evidence import Evidence
 from ..model.rig_model import Model
+from ..starts.from_parts import from_part
+from ..starts.ripples import Ripples
+from ..starts.ripples_passed import fewest_cycles
+from ..starts.screening import LARGEST, LARGEST_OF_TORQUES, Proposal, Screening, as_they_are
+from ..starts.search_space import Space, space_for, starts
+from ..starts.seen_together import LOADS, lacked
+from ..starts.seen_torques import FRICTIONS, SeenTorques
+from ..starts.seen_twist import PLAYS, play
 from .comparison import CellFit
-from .from_parts import from_part
 from .reweighted import ReweightedFits
-from .ripples import Ripples
-from .ripples_passed import fewest_cycles
-from .screening import LARGEST, LARGEST_OF_TORQUES, Proposal, Screening, as_they_are
-from .search_space import Space, space_for, starts
-from .seen_together import LOADS, lacked
-from .seen_torques import FRICTIONS, SeenTorques
-from .seen_twist import PLAYS, play
 
 STICKING = ("coulomb_friction", "presliding_friction")
 """Friction, and the bristles by which it yields before it slides."""

@@ -14,9 +14,10 @@ from typing import Literal
 
 import numpy as np
 
+from fjr_kit.least_squares import Solution
+
 from ..model.rig_model import Model
 from .candidates import Candidate, Costs, candidates, scales
-from .least_squares import Solution
 from .search_space import Space, beside
 
 _SIZES = (0.1, 0.3, 3.0)  # of the size that the linear prediction asks for, tried after that

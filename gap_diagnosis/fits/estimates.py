@@ -17,7 +17,8 @@ from scipy.stats import chi2
 from fjr_sim_node import effects as fx
 
 from ..gates.bag_deviations import SCATTERING
-from ..outcome.diagnosis import Bags, Estimate
+from ..outcome.diagnosis import Bags
+from ..outcome.gap_size import Estimate
 from .comparison import CellFit
 
 FORM = 0.01

@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..starts.ripples_passed import LEAST_PASSED, ripples_passed
 from .cell_fits import CellFitter
 from .comparison import CellFit
-from .ripples_passed import LEAST_PASSED, ripples_passed
 
 WORTH_A_HARMONIC = 1.3
 """Misfit from which a second harmonic is looked for: what noise leaves is none."""

@@ -1,0 +1,12 @@
+"""Where the fits of effects begin: which effects, within which bounds, from which sizes.
+
+Evidence of records goes in, starts of fits come out. Begin with `search_space`: starts and bounds
+of each effect of the `catalogue`, in the measures of `scales`.
+
+- Tried: `screening` tries the starts of each effect, `candidates` predicts the gain of each,
+  `ripples` finds the cycles of ripples (`ripples_passed`: how much of one is seen), and
+  `from_parts` begins a law of several parts where the fit of one part has ended.
+- Read off the record by regression: from the missing torque (`seen_torques`), of frictions, load
+  and inertia at once (`seen_together`), from the twist of a transmission (`seen_twist`), and for
+  another split of the inertia (`other_splits`).
+"""
