@@ -87,6 +87,21 @@ def closed(
     return _figure(share, 1.0 - open_[drawn > 0.0] / drawn[drawn > 0.0], choice)
 
 
+def ratio(part: np.ndarray, whole: np.ndarray, choice: Choice) -> Figure:
+    """Return a sum over another one, with its interval.
+
+    Args:
+        part: what is summed, (all,).
+        whole: what it is compared with, (all,), none below zero.
+        choice: over which both are summed.
+    """
+    value, drawn = (
+        part[i].sum(-1) / np.maximum(whole[i].sum(-1), 1e-300)
+        for i in (choice.chosen, choice.draws)
+    )
+    return _figure(float(value), drawn, choice)
+
+
 def _figure(value: float, drawn: np.ndarray, choice: Choice) -> Figure:
     known = drawn.size > 0 and np.isfinite(drawn).all()
     if not (known and np.ptp(choice.draws, axis=0).any()):

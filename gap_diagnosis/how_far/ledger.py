@@ -13,9 +13,8 @@ from ..outcome.cause import Place
 from ..outcome.diagnosis import Remainder, Stage, Step
 from ..outcome.gap_size import Figure, Gap, StageFigures
 from ..where.remainder import looks_like
-from .bootstrap import Choice, stage_figures
+from .bootstrap import Choice, ratio, stage_figures
 
-_DRAWS = 1000
 _MOST_PLACES = 4
 
 
@@ -171,17 +170,8 @@ class Ledger:
 
     def share(self, without: Model, best: Model, refit: Model) -> Figure:
         """Return how much of what the refit left comes back without a cause, with its interval."""
-        lost = self.squares(without) - self.squares(best)
-        gap = self.squares(refit)
-        draws = np.random.default_rng(0).integers(0, gap.size, (_DRAWS, gap.size))
-        shares = lost[draws].sum(1) / np.maximum(gap[draws].sum(1), 1e-300)
-        low, high = np.quantile(shares, (0.025, 0.975))
-        one = gap.size < 2
-        return Figure(
-            value=float(lost.sum() / max(gap.sum(), 1e-300)),
-            low=math.nan if one else float(low),
-            high=math.nan if one else float(high),
-        )
+        lost, gap = self.squares(without) - self.squares(best), self.squares(refit)
+        return ratio(lost, gap, Choice.among(range(gap.size), np.zeros(gap.size)))
 
     def remainder(self, best: Model, refit: Model) -> Remainder:
         """Return what a model leaves, and what that looks like."""
