@@ -15,10 +15,10 @@ from fjr_interface.resampling.accuracy import Resampling
 from fjr_kit.errors import InputError
 from fjr_kit.telling import CountedProgress
 from fjr_records.any_folder import NOT_PERIODIC, open_folder
-from fjr_records.driven import wrong_sign
 from fjr_records.experiment_bag import Override
 from fjr_records.records import RecordSet
 
+from .checks import signs
 from .compare.metrics import ReferenceModel
 from .periodic_analysis import analyze_periodic
 from .record_analysis import analyze_records
@@ -61,18 +61,16 @@ def analyze(
         raise InputError(f"method must be robust, fast or local, not {method!r}.")
     opened = open_folder(folder, signal_map, override=override, resampling=resampling)
     if isinstance(opened, RecordSet):
-        return _with_sign_doubts(_of_records(opened, method, models))
+        return _with_signs(_of_records(opened, method, models))
     has_reference = signal_map.reference is not None
     found = analyze_periodic(opened, method, models, has_reference, progress)
-    return _with_sign_doubts(found)
+    return _with_signs(found)
 
 
-def _with_sign_doubts(result: Result) -> Result:
-    """Return a result with a note on each level whose torque seems to have the wrong sign."""
-    shown = ((level.level, level.signals) for level in result.levels)
-    doubts = ((level, wrong_sign(s.torque_nm, s.position_rad)) for level, s in shown)
-    notes = tuple(f"level {level}: {doubt}." for level, doubt in doubts if doubt is not None)
-    return result.model_copy(update={"notes": (*result.notes, *notes)})
+def _with_signs(result: Result) -> Result:
+    """Return a result with a check of the signs of each level."""
+    made = tuple(signs(level.level, level.signals) for level in result.levels)
+    return result.model_copy(update={"checks": (*result.checks, *made)})
 
 
 def _of_records(

@@ -1,11 +1,12 @@
-"""Checks of each realization (periodicity, transient, noise, unit) and of the BLA of a level."""
+"""Checks of each realization (periodicity, transient, noise, unit), of signs and BLA of a level."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from fjr_kit.check import Check
-from fjr_records.realization import FALSE_ALARM, Realization
+from fjr_records.driven import opposes, wrong_sign
+from fjr_records.realization import FALSE_ALARM, Realization, TimeSignals
 from fjr_records.units import FOLLOWING_LIMIT, compare_units, following
 
 from .bla.robust import INPUT_VARIANCE_LIMIT
@@ -19,6 +20,8 @@ settles; a real motor bench, disturbed in the band by more than its encoder's no
 TRANSIENT_LIMIT = 0.01
 """Greatest rms of a remaining transient relative to y, where it starts."""
 
+SIGNS_LIMIT = 0.5
+"""Greatest number of doubts on signs: none."""
 UNRELIABLE_LIMIT = 0.5
 """Greatest share of lines that may be unreliable, or whose 95 % disc may hold zero."""
 
@@ -118,6 +121,25 @@ def position_unit(realization: Realization, excited: np.ndarray) -> Check:
         ratio = following(spectra.reference[excited], spectra.position[excited])
         value, sentence = compare_units(ratio)
     return _check(realization, "position_unit", value, FOLLOWING_LIMIT, sentence)
+
+
+def signs(level: int, signals: TimeSignals) -> Check:
+    """Tell whether torque, position and reference of a level go with each other by their signs."""
+    r, u, y = signals.reference_rad, signals.torque_nm, signals.position_rad
+    against = wrong_sign(u, y)
+    mirrored = opposes(r, y) if np.isfinite(r).all() and not np.array_equal(r, u) else None
+    doubts = [doubt for doubt in (against, mirrored) if doubt is not None]
+    found = (
+        "; ".join(doubts) or "nothing speaks against the signs of torque, position and reference"
+    )
+    return Check(
+        name="signs",
+        level=level,
+        passed=len(doubts) <= SIGNS_LIMIT,
+        value=float(len(doubts)),
+        limit=SIGNS_LIMIT,
+        sentence=f"level {level}: {found}.",
+    )
 
 
 def reliable_lines(level: int, bla: BlaEstimate | None) -> Check:

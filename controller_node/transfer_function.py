@@ -22,7 +22,6 @@ from functools import cached_property
 
 import numpy as np
 import scipy
-from scipy.interpolate import CubicSpline
 
 from fjr_kit.compiled import inlined
 from fjr_kit.errors import InputError
@@ -186,7 +185,7 @@ class TransferFunction:
             return position
         at = np.arange(self.steps * position.size) / self.steps
         samples = np.arange(position.size)
-        return CubicSpline(samples, position)(np.minimum(at, samples[-1]))
+        return scipy.interpolate.CubicSpline(samples, position)(np.minimum(at, samples[-1]))
 
     def clamped(self, torque: np.ndarray) -> np.ndarray:
         """Return a torque within the limit."""

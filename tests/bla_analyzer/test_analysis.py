@@ -113,7 +113,7 @@ def test_robust_analysis_of_two_levels(tmp_path):
     assert (result.periods, result.transient_periods, result.described) == (3, 2, True)
     assert result.controller == {"kind": "gain", "p": loop.GAIN}
     assert result.notes == ()
-    assert len(result.checks) == 2 * (3 * 4 + 1)
+    assert len(result.checks) == 2 * (3 * 4 + 2)
     assert all(check.passed for check in result.checks)
     for index, level in enumerate(result.levels):
         data = np.array([simulate(index, m) for m in range(3)]).reshape(3, 3, 5, N)[:, :, 2:]

@@ -166,12 +166,17 @@ def test_how_many_frequencies_carry_an_estimate_is_told_and_a_few_are_no_respons
     assert "too few to be a response: excite more" in left.sentence
 
 
-def test_a_torque_of_the_wrong_sign_is_noted(tmp_path):
-    r, u, y = data()
-    write(tmp_path / "right" / "one", np.stack([r, u, y]))
-    write(tmp_path / "turned" / "one", np.stack([r, -u, y]))
-    told = {
-        name: any("has the wrong sign" in note for note in analyze(tmp_path / name).notes)
-        for name in ("right", "turned")
-    }
-    assert told == {"right": False, "turned": True}
+@pytest.mark.parametrize(
+    ("turned", "said"),
+    [
+        ("", "the signs of torque, position and reference go together"),
+        ("u", "the torque brakes the motion more than it drives it"),
+        ("r", "the position goes against the reference"),
+    ],
+)
+def test_a_wrong_sign_of_torque_or_reference_fails_a_check(tmp_path, turned, said):
+    signs = [-1.0 if signal in turned else 1.0 for signal in "ruy"]
+    record = data(kind="trapezoid") * np.array(signs)[:, None]
+    write(tmp_path / "rig" / "one", record)
+    (check,) = [c for c in analyze(tmp_path / "rig").checks if c.name == "signs"]
+    assert check.passed is not bool(turned) and said in check.sentence
