@@ -132,9 +132,9 @@ from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.model.steady_runs import steady_runs
 from gap_diagnosis.outcome.verdict_words import explanation, unit_of
 from gap_diagnosis.report.telltales import drawn
-from gap_diagnosis.which.catalogue import catalogue
+from gap_diagnosis.starts.catalogue import catalogue
 from gap_diagnosis.where.telltale import shown
-from gap_diagnosis.which.cell_fits import CellFitter
+from gap_diagnosis.fits.cell_fits import CellFitter
 
 name = "cubic_drag.nm_s3_rad3"
 assert SIMULATOR[name].unit == "N m s3/rad3"
