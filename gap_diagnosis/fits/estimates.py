@@ -19,6 +19,8 @@ from fjr_sim_node import effects as fx
 from ..gates.bag_deviations import SCATTERING
 from ..outcome.diagnosis import Bags
 from ..outcome.gap_size import Estimate
+from ..starts.ripples_passed import ripples_passed
+from ..starts.scales import Scales
 from .comparison import CellFit
 
 FORM = 0.01
@@ -32,10 +34,11 @@ _LEFT_TO_OTHERS = 0.01
 NORMAL_95 = 1.96
 
 
-def form(fit: CellFit, share: float) -> np.ndarray:
+def form(fit: CellFit, share: float, scales: Scales) -> np.ndarray:
     """Return the standard deviation of a fit's parameters by the forms of the effects' laws.
 
-    A number of cycles has none: whatever the form of a ripple, its period is the machine's.
+    A number of cycles has none where a whole ripple is passed: whatever its form, its period is the
+    machine's. Of a part of a ripple the form decides how long the whole is.
 
     Base parameters follow the effects where a remainder stays: a joint's inertia was off by more
     than its own error in a third of robot joints beside friction of another form.
@@ -43,6 +46,7 @@ def form(fit: CellFit, share: float) -> np.ndarray:
     Args:
         fit: an explanation.
         share: of a parameter's value; in rad of an angle.
+        scales: of the record.
 
     Returns:
         (parameters,), in units of the point; zero for the base parameters if noise explains what
@@ -51,9 +55,15 @@ def form(fit: CellFit, share: float) -> np.ndarray:
     own, x = len(fit.space.nominal), fit.solution.x
     roles = np.array([fx.parameter(name).role for name in fit.space.effects], str)
     sizes = np.where(roles == "angle", 1.0 / np.array(fit.space.units), np.abs(x[own:]))
-    sizes = np.where(roles == "cycles", 0.0, sizes)
+    passed = np.array([_passed(fit, name, scales) for name in fit.space.effects])
+    sizes = np.where(roles == "cycles", np.where(passed < 1.0, sizes / passed, 0.0), sizes)
     base = np.full(own, float(share >= FORM_BESIDE and sizes.size > 0))
     return share * np.concatenate([base, sizes])
+
+
+def _passed(fit: CellFit, name: str, scales: Scales) -> float:
+    """Return how many of its ripples the effect of a parameter passes."""
+    return ripples_passed(fit.model, name.split(".", 1)[0], scales)
 
 
 def linear_estimates(fit: CellFit, std: np.ndarray) -> dict[str, Estimate]:

@@ -42,8 +42,6 @@ LEAST_PERCENT = 1e-3
 """A smaller share is shown as less than that: its digits mean nothing to a reader."""
 NO_SHARE = "none seen"
 """What stands for a share that may be zero or less."""
-_BETTER = 1.0
-"""Gain (nats) over the chosen explanation above which one of no greater misfit does better."""
 _MOST_DIGITS = 6
 _AS_NOISE = 1.5  # times what noise leaves: a remainder no greater than that has no look of its own
 
@@ -117,8 +115,7 @@ def choice_sentences(diagnosis: Diagnosis) -> list[str]:
         other
         for chosen in diagnosis.contenders[:1]
         for other in diagnosis.contenders[1:]
-        if (other.gain or 0.0) > _BETTER
-        and (other.held_out_chi2 or 0.0) <= (chosen.held_out_chi2 or math.inf)
+        if other.better and (other.held_out_chi2 or 0.0) <= (chosen.held_out_chi2 or math.inf)
     ]
     if better and diagnosis.effects:
         names = ",".join(better[0].effects)

@@ -13,10 +13,12 @@ class Contender(ResultModel):
         held_out_chi2: misfit on the data that select, which are not those of `steps`.
         gain: log-likelihood that it gains on a block of these data over the chosen explanation,
             nats; less than 0 where it predicts worse.
+        better: whether that gain repeats too surely to be chance.
         converged: whether the fit did.
     """
 
     effects: list[str]
     held_out_chi2: OptionalNumber
     gain: OptionalNumber
+    better: bool = False
     converged: bool

@@ -117,7 +117,7 @@ WORDS: dict[Verdict, Words] = {
     "partly_explained": Words(
         "Partly explained",
         "The named causes are there, by tests on data that no fit has seen; beyond them a gap "
-        "remains that no effect of the catalogue accounts for.",
+        "remains of which no effect of the catalogue surely is the cause.",
         "Go on with updated.yaml, which switches the named causes on, and look at what the "
         "remainder looks like before you look for a further cause.",
         "A cause stands for its law at the recorded amplitudes and in the recorded band only. The "

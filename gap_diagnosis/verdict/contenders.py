@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from ..fits.cell_fits import CellFitter
 from ..fits.comparison import CellFit
-from ..fits.gains import gain
+from ..fits.gains import Gain, gain
 from ..outcome.contender import Contender
 from ..which.found import Found
 
@@ -32,14 +32,15 @@ def contenders(fitter: CellFitter, found: Found, tied: Sequence[CellFit]) -> lis
     others = tied if best.effects else found.rivals.get(1, [])
     if not others:
         return []
-    gains = [gain(fitter, fit, best).mean for fit in others]
-    ranked = sorted(zip(gains, others, strict=True), key=lambda one: -one[0])
+    gains = [gain(fitter, fit, best) for fit in others]
+    ranked = sorted(zip(gains, others, strict=True), key=lambda one: -one[0].mean)
     return [
         Contender(
             effects=list(fit.effects),
             held_out_chi2=fitter.misfit(fit),
-            gain=gained,
+            gain=gained.mean,
+            better=gained.present,
             converged=fit.solution.converged,
         )
-        for gained, fit in [(0.0, best), *ranked]
+        for gained, fit in [(Gain(0.0, 0.0, 0.0, 1.0), best), *ranked]
     ]

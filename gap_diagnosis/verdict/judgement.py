@@ -55,6 +55,9 @@ RINGS = (
     "give the datasheet both inertias and the stiffness (jm, j, k0): its damping is fitted then."
 )
 
+_IF_WORSE = 0.75
+"""Of its presence, what is left to a cause beside which unseen runs are surely missed by more."""
+
 
 def stopped(verdict: Verdict, gates: GateReport) -> Diagnosis:
     """Return the diagnosis of an experiment that a gate forbids to fit."""
@@ -174,11 +177,13 @@ def _cause(
     moved = where_it_acts(fitter, found.best, tested.without, ledger.parts)
     refit = found.steps[0].model
     without = tested.without.model if tested.without.effects else refit
+    share = ledger.share(without, found.best.model, refit)
+    worse = share.high is not None and share.high < 0.0
     return Cause(
         effect=tested.effect,
         others=alternatives.get(tested.effect, []),
-        present=min(tested.present, reproduced(fitter, found.best)),
-        share=ledger.share(without, found.best.model, refit),
+        present=min(tested.present, reproduced(fitter, found.best)) * (_IF_WORSE if worse else 1.0),
+        share=share,
         invariance_p=tested.invariance_p,
         where=ledger.places(moved),
         parameters=parameters,

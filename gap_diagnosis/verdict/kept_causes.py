@@ -19,7 +19,7 @@ from ..starts.seen_together import lacked
 from ..which.equivalents import founded, partners
 from ..which.found import Found
 from .judgement import FEWEST_PARTS
-from .not_named import unsure, why_not
+from .not_named import beyond_named, unsure, why_not
 from .tested_causes import Tested, causes_with_tests
 
 _MAY_BE_UNSURE = 2
@@ -104,7 +104,8 @@ def kept(
                 continue
         fewer = _taken_out(fitter, before, weakest)
         tests = tests_of(fewer[-1])
-        nearly = weakest.nearly_passes and weakest.present >= LEAST_BEARING
+        against_little = weakest.nearly_passes or weakest.gains_beside_size
+        nearly = against_little and weakest.present >= LEAST_BEARING
         if (guessed or nearly) and _bears(tested, tests):
             bearing.add(weakest.effect)
             continue
@@ -115,6 +116,8 @@ def kept(
         steps, tested = fewer, tests
     doubted = {e: p for e, p in doubted.items() if e not in steps[-1].effects}
     notes += unsure({e: p for e, p in doubted.items() if e in nearly_named})
+    named = bool(steps[-1].effects)
+    notes += beyond_named(doubted, left_of(fitter, found.best, steps[-1]), named)
     if tested and any(len(fit.effects) != count for count, fit in enumerate(steps)):
         steps = [steps[0], *_one_by_one(fitter, steps[-1], tested)]
     return replace(found, steps=steps, notes=tuple(notes), doubted=doubted), _bearing(tested)

@@ -28,6 +28,25 @@ def unsure(doubted: Mapping[str, float]) -> list[str]:
     ]
 
 
+def beyond_named(doubted: Mapping[str, float], left: float, named: bool) -> list[str]:
+    """Return the sentence on what was found beside the named causes and leaves much less with them.
+
+    Args:
+        doubted: presence of each, by its identifier.
+        left: what all that was found leaves, of the squared error of the named causes, or of the
+            refit.
+        named: whether there are any.
+    """
+    if not doubted or not left < _MUCH:
+        return []
+    shown = ", ".join(explanation([effect]) for effect in doubted)
+    return [
+        f"With {shown}{' as well' if named else ''}, {left:.0%} of the squared error would be left "
+        f"that {'the named causes leave' if named else 'the refit leaves'}: the catalogue may "
+        "account for it, but none of these effects is sure."
+    ]
+
+
 def _changing(tested: Tested) -> list[str]:
     """Return the sentence on a cause that closes much, but not with the same size at all levels."""
     if tested.invariant or not tested.gain.present or not tested.share.value >= _MUCH:

@@ -25,6 +25,7 @@ from ..which.presence import (
     invariance,
     over_usual,
 )
+from ..which.slewing import doubt_of_rate, samples_behind
 
 LEAST_IN_BAND = 0.8
 """Of what is left in its best band, what a cause must close if its share of all is not certain."""
@@ -77,6 +78,7 @@ class Tested:
         beside_others: how much of what another cause does it closes there; see `beside_others`.
         ripples: how many of its ripples the motion passes; infinite for what has none.
         unusual: its size over the greatest that machines have, see `EffectParameter.usual`.
+        behind: how many samples in a row it holds the torque back; infinite for what is no rate.
     """
 
     effect: str
@@ -95,6 +97,7 @@ class Tested:
     over_noise_closed: float = math.nan
     borne: float = 0.0
     unusual: float = 0.0
+    behind: float = math.inf
 
     @property
     def passed(self) -> bool:
@@ -104,15 +107,21 @@ class Tested:
     @property
     def passes_beside_size(self) -> bool:
         """Whether it passes all tests but that of its own size, which another cause may blur."""
-        closes = self._closes
         least = LEAST_PRESENT if self.certain else _UNCERTAIN * LEAST_PRESENT
-        there = self.gain.present and closes and self.bounded is None
-        return there and self.invariant and self.present >= least
+        return self.gains_beside_size and self.present >= least
 
     @property
     def nearly_passes(self) -> bool:
         """Whether nothing is against it but that it is not sure enough, or repeats less often."""
         return self.gains and self.gain.p <= MOST_P
+
+    @property
+    def gains_beside_size(self) -> bool:
+        """Whether nothing is against it but its size, which its own shape may blur as well.
+
+        Of a ripple of which the motion passes a part, amplitude, cycles and phase blur each other.
+        """
+        return self.gain.present and self._closes and self.bounded is None and self.invariant
 
     @property
     def gains(self) -> bool:
@@ -202,7 +211,7 @@ class Tested:
             np.interp(self.beside_others, _OF_FORM, (0.0, 1.0)),
         )
         sure *= _IF_OF_FORM + (1.0 - _IF_OF_FORM) * float(beyond_form)
-        sure *= doubt_of_shape(self.ripples)
+        sure *= doubt_of_shape(self.ripples) * doubt_of_rate(self.behind)
         sure *= float(np.interp(self.unusual, _UNUSUAL, (1.0, _IF_UNUSUAL)))
         if not self.certain or self.bounded is not None:
             sure *= _UNCERTAIN
@@ -250,6 +259,7 @@ def causes_with_tests(
                 over_noise,
                 1.0 - _left_over_noise(fitter, fit, without),
                 unusual=over_usual(fit.model, effect),
+                behind=samples_behind(fit.model, effect, fitter.evidence.records),
             )
         )
     return found

@@ -14,6 +14,7 @@ from gap_diagnosis.fits.estimates import form, kept_from_zero, linear_estimates,
 from gap_diagnosis.model.rig_model import Model
 from gap_diagnosis.outcome.cause_words import digits, percent
 from gap_diagnosis.outcome.gap_size import Estimate
+from gap_diagnosis.starts.scales import Scales
 from gap_diagnosis.starts.search_space import Space
 from gap_diagnosis.which.presence import beyond_zero, cell_estimates
 
@@ -94,10 +95,16 @@ def fitted(names: tuple[str, ...], values: tuple[float, ...], stds: tuple[float,
     return fit_of(effects, model, Space({}, names, (1.0,) * len(names)), solution)
 
 
+def scales_of(travel_rad: float) -> Scales:
+    return Scales(100.0, 5.0, 0.05, 0.05, 1e-3, 50.0, 0.5, 300.0, travel_rad)
+
+
 def test_the_period_of_a_ripple_is_known_as_the_fit_knows_it_and_its_size_as_its_law():
     names = ("cogging.amplitude_nm", "cogging.cycles_per_turn", "cogging.phase_rad")
     ripple = fitted(names, (0.5, 200.0, 0.3), (1e-3, 0.01, 1e-3))
-    assert form(ripple, 0.03) == pytest.approx([0.015, 0.0, 0.03])
+    assert form(ripple, 0.03, scales_of(0.1)) == pytest.approx([0.015, 0.0, 0.03])
+    part_of_one = form(ripple, 0.03, scales_of(2.0 * np.pi / 200.0 / 4.0))
+    assert part_of_one == pytest.approx([0.015, 0.03 * 200.0 * 4.0, 0.03])
 
 
 BIAS, ECCENTRIC = "torque_bias.torque_nm", "encoder_eccentricity.amplitude_rad"
