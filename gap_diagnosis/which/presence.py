@@ -66,9 +66,8 @@ def cell_estimates(
     std = standard_errors(solution.jacobian, solution.residuals, fitter.groups, prior)
     moved = moved_by_scatter(fit, fitter.runs, scatter)
     share = FORM if fitter.misfit(fit) < NOTHING_LEFT else FORM_BESIDE
-    linear = linear_estimates(
-        fit, np.sqrt(std**2 + moved**2 + form(fit, share, fitter.scales) ** 2)
-    )
+    by_form = form(fit, share, fitter.scales)
+    linear = linear_estimates(fit, np.sqrt(std**2 + moved**2 + by_form**2))
     if len(fit.effects) > 1:
         return linear
     return kept_from_zero(linear, {e: fall(fitter, fit, other) for e, other in without.items()})

@@ -75,12 +75,14 @@ def test_a_cause_that_closes_nothing_is_said_to_make_the_simulation_no_better():
 
 
 def test_an_explanation_that_does_better_than_the_named_one_is_told_with_what_it_has_instead():
-    def contender(effects, gain, misfit=2.0):
-        return Contender(effects=effects, held_out_chi2=misfit, gain=gain, converged=True)
+    def contender(effects, better, misfit=2.0):
+        return Contender(
+            effects=effects, held_out_chi2=misfit, gain=1.3, better=better, converged=True
+        )
 
     named = ["coulomb_friction", "torque_bias"]
-    for gain, misfit, does in ((0.3, 1.0, False), (16.0, 1.0, True), (1.3, 2.5, False)):
-        found = [contender(named, 0.0), contender(["torque_bias", "delay"], gain, misfit)]
+    for surely, misfit, does in ((False, 1.0, False), (True, 1.0, True), (True, 2.5, False)):
+        found = [contender(named, False), contender(["torque_bias", "delay"], surely, misfit)]
         told = biased(0.1).model_copy(update={"contenders": found})
         assert contender_names(told) == ["as named", "delay for coulomb friction"]
         better = [s for s in choice_sentences(told) if "--effects torque_bias,delay" in s]
