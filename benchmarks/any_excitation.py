@@ -159,8 +159,8 @@ def main() -> None:
     first, last, lines, lost, sure, held = np.array(found, float).T
     print(
         f"\ntrapezoid, {len(seeds)} linear rigs: {np.median(first):.2f} to "
-        f"{np.median(last):.1f} Hz (medians), {lines.sum():.0f} lines found, {lost.sum():.0f} left out, {sure.sum():.0f} "
-        f"reliable, whose discs hold {covered(held, sure)}"
+        f"{np.median(last):.1f} Hz (medians), {lines.sum():.0f} lines found, {lost.sum():.0f} "
+        f"left out, {sure.sum():.0f} reliable, whose discs hold {covered(held, sure)}"
     )
 
 
