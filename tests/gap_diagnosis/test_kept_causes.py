@@ -395,6 +395,26 @@ def test_what_fails_again_and_again_ends(searched, monkeypatch):
     assert len(tested) == len(found.best.effects) <= 2
 
 
+@pytest.mark.parametrize(("gained", "stays"), [(SURELY, True), (Gain(5.0, 4.0, 0.6, 0.3), False)])
+def test_a_cause_whose_shape_blurs_its_size_stays_where_sure_ones_fail_without_it(
+    searched, monkeypatch, gained, stays
+):
+    fitter, fits = searched
+    blurred = fits[2].effects[-1]
+
+    def tests_of(*args):
+        return [
+            replace(t, certain=False, gain=gained, in_band=0.99) if t.effect == blurred else t
+            for t in causes_with_tests(*args)
+        ]
+
+    monkeypatch.setattr(kept_causes_module, "causes_with_tests", tests_of)
+    monkeypatch.setattr(kept_causes_module, "_bears", lambda tested, without: True)
+    monkeypatch.setattr(kept_causes_module, "_in_its_place", lambda *_: None)
+    found, _ = kept(fitter, Found(fits[:3]), SCATTER, lambda _: None, fits[2].effects)
+    assert (blurred in found.best.effects) is stays
+
+
 def test_friction_that_a_datasheet_lacks_stays_unless_something_is_against_it(searched):
     fitter, fits = searched
     tested = causes_with_tests(fitter, fits[-1], fits[0], SCATTER)
