@@ -110,6 +110,6 @@ def test_a_package_imports_nothing_that_was_not_asked_for():
         "print(sorted(m for m in sys.modules if m.startswith('gap_diagnosis.')))\n"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    names = ("", ".contender", ".diagnosis")
+    names = ("", ".cause", ".contender", ".diagnosis", ".gap_size")
     outcome = [f"gap_diagnosis.outcome{name}" for name in names]
     assert done.stdout.splitlines() == ["[]", "False", "[]", str(outcome)]
