@@ -129,9 +129,7 @@ def signs(level: int, signals: TimeSignals) -> Check:
     against = wrong_sign(u, y)
     mirrored = opposes(r, y) if np.isfinite(r).all() and not np.array_equal(r, u) else None
     doubts = [doubt for doubt in (against, mirrored) if doubt is not None]
-    found = (
-        "; ".join(doubts) or "nothing speaks against the signs of torque, position and reference"
-    )
+    found = "; ".join(doubts) or "the signs of torque, position and reference go together"
     return Check(
         name="signs",
         level=level,
