@@ -219,12 +219,11 @@ def _standstill(record: Record) -> float | None:
     """
     rate = record.description.sample_rate_hz
     length = max(int(_STILL_S * rate), _LEAST_STILL)
-    position = record.position
-    count = position.size // length
-    if count < 2:
+    wholes = [each[: each.size // length * length] for each in (record.position, *record.held)]
+    pieces = np.concatenate(wholes).reshape(-1, length)
+    if len(pieces) < 2:
         return None
-    pieces = position[: count * length].reshape(count, length)
-    travel = float(np.ptp(position))
+    travel = float(np.ptp(record.position))
     still = pieces[np.ptp(pieces, axis=1) < _STILL * travel]
     if not len(still):
         return None
