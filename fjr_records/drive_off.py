@@ -48,8 +48,8 @@ class Off:
         where = " and ".join(f"the {at} {n / rate_hz:.3g} s" for n, at in ends if n)
         return (
             f"in {where} the position stands at a torque of {self.seen:.2g} {unit}, at a place "
-            f"that takes about {self.takes:.2g} {unit} at other times: there the drive is off (a closed "
-            "brake holds the axis)"
+            f"that takes about {self.takes:.2g} {unit} at other times: there the drive is off (a "
+            "closed brake holds the axis)"
         )
 
 
