@@ -17,6 +17,7 @@ from fjr_interface.resampling.accuracy import Resampling
 from fjr_kit.errors import InputError
 
 from .discover import NoPeriodError
+from .drive_off import without_off_ends
 from .experiment_bag import Override
 from .experiment_folder import ExperimentFolder, open_experiment
 from .records import RecordSet, read_records, reference_optional
@@ -35,7 +36,8 @@ def open_folder(
     """Open a folder as an experiment of steady periods where it has them, else read its records.
 
     Bags say by their description which they are. Of bags without one the period is looked for; if
-    there is none they are records, and a note says why.
+    there is none they are records, and a note says why. Ends of records at which the drive is off
+    are left out.
 
     Args:
         folder: experiment folder, or one bag.
@@ -57,13 +59,13 @@ def open_folder(
                 f"{folder}: records are not cut into periods; leave out the number of periods, of "
                 "transient periods and of samples per period."
             )
-        return read_records(folder, signal_map, resampling=resampling)
+        return without_off_ends(read_records(folder, signal_map, resampling=resampling))
     try:
         return open_experiment(folder, signal_map, override=override, resampling=resampling)
     except NoPeriodError as error:
         if override != Override() or any(r.experiment is not None for r in readers):
             raise
-        records = read_records(folder, signal_map, resampling=resampling)
+        records = without_off_ends(read_records(folder, signal_map, resampling=resampling))
         why = f"{NOT_PERIODIC} ({str(error).rstrip('.')})."
         return replace(records, notes=(why, *records.notes))
 

@@ -215,21 +215,25 @@ def _steps(difference: np.ndarray) -> float | None:
 def _standstill(record: Record) -> float | None:
     """Return the scatter of the position where the axis stands; None if it never does.
 
-    Zero if it reads the same value there for ever.
+    Zero if it reads the same value there for ever. Ends at which a brake held the axis are asked
+    where it never stands by itself.
     """
-    rate = record.description.sample_rate_hz
-    length = max(int(_STILL_S * rate), _LEAST_STILL)
-    position = record.position
-    count = position.size // length
-    if count < 2:
-        return None
-    pieces = position[: count * length].reshape(count, length)
-    travel = float(np.ptp(position))
-    still = pieces[np.ptp(pieces, axis=1) < _STILL * travel]
-    if not len(still):
-        return None
-    scatter = float(np.quantile([_detrended(piece) for piece in still], _QUIETEST))
-    return scatter if scatter > _SCATTERS * travel else 0.0
+    least = _LEAST_STILL, _STILL_S * record.description.sample_rate_hz
+    length = int(max(least))
+    travel = float(np.ptp(record.position))
+    own = [record.position] if record.samples >= 2 * length else []
+    for source in (own, record.held):
+        pieces = [
+            p for each in source for p in _pieces(each, length) if np.ptp(p) < _STILL * travel
+        ]
+        if pieces:
+            scatter = float(np.quantile([_detrended(piece) for piece in pieces], _QUIETEST))
+            return scatter if scatter > _SCATTERS * travel else 0.0
+    return None
+
+
+def _pieces(signal: np.ndarray, length: int) -> np.ndarray:
+    return signal[: signal.size // length * length].reshape(-1, length)
 
 
 def _detrended(piece: np.ndarray) -> float:

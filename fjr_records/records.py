@@ -38,6 +38,7 @@ class Record:
         position: y, likewise in rad.
         link: q, likewise in rad; None without a second encoder.
         elapsed_s: when it began, since the first run did (s); zero where that is not known.
+        held: position at the ends that were left out since the drive was off, for its noise.
     """
 
     name: str
@@ -47,6 +48,7 @@ class Record:
     position: np.ndarray
     link: np.ndarray | None
     elapsed_s: float = 0.0
+    held: tuple[np.ndarray, ...] = ()
 
     @property
     def level(self) -> int:

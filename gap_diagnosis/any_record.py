@@ -26,6 +26,10 @@ from .outcome.linear_words import in_linear_units
 from .starts.search_space import TOLERANCE
 from .steady_periods import investigate_periods
 
+UNKNOWN_GAINS = (
+    "The periodic runs are compared as whole records, since gains of their controller are unknown"
+)
+
 
 def diagnose(
     folder: Path | str,
@@ -73,6 +77,7 @@ def read_any(
     """Read a folder as steady periods where it has them, else as records.
 
     Bags say by their description which they are. Of bags without one the period is looked for.
+    Steady periods of a controller with unknown gains are taken as records as well, with a note.
 
     Args:
         folder: experiment folder.
@@ -88,7 +93,21 @@ def read_any(
     opened = open_folder(
         folder, optional, override=override, resampling=resampling, as_records=as_record
     )
-    return opened if isinstance(opened, RecordSet) else whole(opened)
+    return opened if isinstance(opened, RecordSet) else _with_known_law(whole(opened))
+
+
+def _with_known_law(recorded: RecordedExperiment) -> RecordedExperiment | RecordSet:
+    """Return steady periods of a law that can be simulated, else whole runs, which give its gains.
+
+    A mean period is that of a closed loop, which no law without its gains repeats.
+    """
+    laws = [r.experiment.controller or {} for r in recorded.realizations]
+    unknown = dict.fromkeys(name for law in laws for name in law.get("unknown", []))
+    if not unknown:
+        return recorded
+    records = recorded.as_records()
+    note = f"{UNKNOWN_GAINS} ({', '.join(unknown)})."
+    return replace(records, notes=(note, *records.notes))
 
 
 def investigate(

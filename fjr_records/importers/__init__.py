@@ -11,7 +11,8 @@ hold) and `importer.write_bags`.
 - Stamps: `timing` decides when samples were taken and brings them onto an even grid by `stamps`;
   `rounded_stamps` finds the even samples behind coarse stamps, `clock_stamps` reads calendar and
   clock, `split_stamps` joins seconds and nanoseconds, `own_stamps` are of signals that were not
-  sampled together; `part` cuts the part that is asked for.
+  sampled together; `part` cuts the part that is asked for, `refresh` finds signals that are
+  refreshed more slowly than they are logged.
 - Signals: `wraps` adds the turns that an encoder leaves out, `integrals` makes angles of speeds,
   `made_torque` the torque of a described controller.
 - The kind of run: `repetition` and `coherence` say whether a run is periodic and whether its

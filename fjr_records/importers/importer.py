@@ -20,6 +20,7 @@ from fjr_kit.errors import InputError
 
 from .describe import Description, describe
 from .record_file import ImportOptions, Record, Samples, read_samples, understand
+from .refresh import at_the_rate_of_angles
 from .repetition import insists
 
 WRONG_CONTROLLER = 0.5
@@ -68,7 +69,8 @@ def read_files(files: Sequence[str | Path], options: ImportOptions) -> Understoo
             "--controller, or --swings-free."
         )
     laws = [controller_file.read_controller(path) for path in options.controllers]
-    samples = [read_samples(Path(file), options) for file in files]
+    logged = [read_samples(Path(file), options) for file in files]
+    samples = at_the_rate_of_angles(logged, fixed=options.samples_per_period is not None)
     common = _grid_rate(samples)
     rates = [common or each.timing.rate_hz for each in samples]
     sources = [str(path) for path in options.controllers] * (1 if len(laws) > 1 else len(samples))
@@ -76,6 +78,9 @@ def read_files(files: Sequence[str | Path], options: ImportOptions) -> Understoo
     faster = False
     for number, source in enumerate(sources):
         structure = laws[number if len(laws) > 1 else 0]
+        if samples[number].timing.rate_hz < logged[number].timing.rate_hz:
+            own = {"rate_hz": structure.rate_hz or logged[number].timing.rate_hz}
+            structure = structure.model_copy(update={**own, "between_samples": "joined"})
         faster |= structure.steps(rates[number], f"{source}: controller") > 1
         controllers[number] = controller_file.describe(structure, rates[number], source)
     records = [

@@ -11,11 +11,12 @@ import numpy as np
 from controller_node.transfer_function import TransferFunction
 from fjr_kit.errors import InputError
 
+from ..drive_off import off_ends
 from ..driven import opposes, wrong_sign
 from ..units import may_stick, unit_taken_for_rad
 from . import coherence, part
 from .columns import read_columns
-from .import_map import OWN_TIME, TIME, Column, is_time, refuse_both_axes
+from .import_map import OWN_TIME, TIME, Column, is_linear, is_time, refuse_both_axes
 from .integrals import DRIFTS, integrals
 from .made_torque import MADE, ONCE, SWINGS_FREE, made_torque
 from .own_stamps import own_stamps
@@ -253,6 +254,10 @@ def understand(
         doubts += (f"{against}: --map torque=-COLUMN or position=-COLUMN turns it",)
     if "r" in signals and (against := opposes(signals["r"], signals["y"])) is not None:
         doubts += (f"{against}: --map reference=-COLUMN or position=-COLUMN turns it",)
+    off = off_ends(signals["u"], signals["y"], rate_hz) if repetition is None else None
+    if off is not None:
+        unit = "N" if is_linear(columns) else "N m"
+        notes += (f"{off.told(rate_hz, unit)}; analysis and diagnosis leave these out",)
     other = coherence.unrelated(signals, repetition)
     if other is not None:
         raise InputError(f"{path}: {other}.")

@@ -146,7 +146,7 @@ def test_degrees_taken_for_rad_are_refused_unless_a_factor_says_that_they_are_me
     meant = ("--out", tmp_path / "a", *words, "--map=position=y:1")
     assert "Warning: " in run("import", tmp_path / "rig.npz", *meant).stderr
     analysed = run("analyze", tmp_path / "a", "--method", "fast", "--out", tmp_path / "results")
-    assert "1 of 5 checks failed" in analysed.stdout
+    assert "1 of 6 checks failed" in analysed.stdout
     assert "y seems to be in degrees and taken for rad" in " ".join(analysed.stdout.split())
     right = ("--out", tmp_path / "b", *words, "--map=position=y:deg")
     assert run("import", tmp_path / "rig.npz", *right).stderr == ""
