@@ -21,6 +21,8 @@ from fjr_sim_node import effects as fx
 
 from ..model.evidence import Evidence
 from ..model.rig_model import Model
+from .other_splits import YIELDS
+from .seen_resonance import hidden, share_of
 from .seen_together import LAWS, Seen, heavier, load_parameters, load_torques, solved
 
 FRICTIONS = tuple(name.split(".")[0] for name in LAWS)
@@ -31,6 +33,7 @@ _FASTEST = 1.0  # ripples of a higher frequency, over the crossover, the observe
 _REST, _FALLS, _SLIDES = 0.03, 0.05, 0.2
 """Of the rms velocity: below the first friction is whatever holds, above the second it may fall
 from breakaway; above the third it slides, though it yields before."""
+_VISCOUS = ("fvm", "viscous_friction.motor_nm_s_rad")
 _PEAKS = 2
 _NEARLY, _ALIKE = 0.95, 4  # of the best; how many of those that explain so much
 
@@ -54,6 +57,8 @@ class SeenTorques:
         self._simulator, self._every = simulator, every
         self._swings_free = evidence.records.swings_free
         self._ends = np.cumsum([records[index].samples for index in runs])[:-1]
+        self._angles = [records[index].position for index in runs]
+        self._rate = rate
         self._places, columns, motions = [], [], []
         for index, missing in zip(runs, simulator.missing_torque(model, runs), strict=True):
             record = records[index]
@@ -162,6 +167,36 @@ class SeenTorques:
         inertia = 0.0 if self._swings_free else added[-1]
         sizes = {n: effects.get(n, 0.0) + size for n, size in zip(names, added, strict=False)}
         return None if min(sizes.values()) <= 0.0 else heavier(self._model, inertia, sizes)
+
+    def resonance(self) -> list[Model]:
+        """Return models of a rigid axis with a mass behind a spring more, see `seen_resonance`.
+
+        What damps the mass is a share of the viscous friction, as far as there is any.
+        """
+        plant, effects = self._model.plant, self._model.effects
+        if self._angle.size < 4 * _PER_CROSSOVER or not np.isfinite(self._missing).all():
+            return []
+        angle, velocity, acceleration = self._motion
+        torques = [np.ones(angle.size), angle, velocity, np.sign(velocity), -acceleration]
+        beside = [self._seen(torque) for torque in torques]
+        found = hidden(
+            self._angles, self._rate, self._crossover_hz, beside, self._smooth, self._seen
+        )
+        viscous = sum(size for n, size in {**plant, **effects}.items() if n in _VISCOUS)
+        models = []
+        for mass in found:
+            if (share := share_of(mass, plant["jm"])) is None:
+                continue
+            yields = {
+                "compliance_rad_nm": 1.0 / mass.stiffness,
+                "link_inertia_share": share,
+                "link_coulomb_share": 0.0,
+                "link_viscous_share": min(mass.drag / viscous, 1.0) if viscous else 0.0,
+            }
+            heavy = {**plant, "jm": plant["jm"] + mass.added}
+            own = {f"{YIELDS}.{name}": value for name, value in yields.items()}
+            models.append(Model(heavy, {**effects, **own}))
+        return models
 
     def seeds(self, effect: str, tried: np.ndarray) -> list[dict[str, float]]:
         """Return starting points of a ripple, by full parameter names.

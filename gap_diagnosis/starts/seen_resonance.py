@@ -1,0 +1,119 @@
+"""A mass behind a spring, seen in the torque that the model of a rigid axis lacks.
+
+A mass m on a spring follows the acceleration a of the motor as m w^2/(s^2 + 2 zeta w s + w^2) a: at
+each frequency w this torque is linear in m, though nothing of it is linear in the compliance. So
+frequencies are tried one after the other, and m follows by least squares. A pendulum that hangs on
+a cart, or a load on a soft belt, acts so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import bilinear, lfilter
+
+from .seen_together import solved
+
+_DAMPED = (0.03, 0.1)  # ratios of damping that are tried
+_APART = 0.05  # from one frequency to the next, relative: about as wide as it is damped
+_FEWEST_PERIODS = 3.0  # of the lowest frequency, in the shortest run
+_APART_AT_LEAST = 1.2  # ratio of two frequencies that are both taken
+_SHARES = (0.01, 0.99)  # of the inertia behind the spring
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """A mass behind a spring.
+
+    Attributes:
+        inertia: of the mass, kg m2.
+        added: to the inertia of the model that lacks it, both masses together, kg m2.
+        frequency: its natural frequency with the motor held, rad/s.
+        damping: its damping ratio then.
+        left: squares of the torque that it leaves.
+    """
+
+    inertia: float
+    added: float
+    frequency: float
+    damping: float
+    left: float
+
+    @property
+    def stiffness(self) -> float:
+        """Stiffness of its spring, N m/rad."""
+        return self.inertia * self.frequency**2
+
+    @property
+    def drag(self) -> float:
+        """Viscous friction that damps it so, N m s/rad."""
+        return 2.0 * self.damping * self.frequency * self.inertia
+
+
+def hidden(
+    runs: Sequence[np.ndarray],
+    rate: float,
+    highest_hz: float,
+    beside: Sequence[np.ndarray],
+    missing: np.ndarray,
+    seen: Callable[[np.ndarray], np.ndarray],
+    most: int = 2,
+) -> list[Hidden]:
+    """Return masses behind springs that explain a torque best, the best first.
+
+    Args:
+        runs: angle of each run, (samples,), rad.
+        rate: of the samples, Hz.
+        highest_hz: up to which the torque is known.
+        beside: what else is in the torque, as seen, (places,) each; the last one is that of more
+            inertia of the motor, for a size of one.
+        missing: the torque that a rigid model lacks, (places,), N m.
+        seen: makes of a torque of all runs, (samples,), what is seen of it, (places,).
+        most: how many are returned.
+    """
+    lowest = _FEWEST_PERIODS * rate / min(run.size for run in runs)
+    if not lowest < highest_hz:
+        return []
+    count = int(np.log(highest_hz / lowest) / _APART) + 2
+    found = [
+        one
+        for frequency in 2.0 * np.pi * np.geomspace(lowest, highest_hz, count)
+        for damping in _DAMPED
+        if (one := _at(frequency, damping, runs, rate, beside, missing, seen)) is not None
+    ]
+    chosen: list[Hidden] = []
+    for one in sorted(found, key=lambda one: one.left):
+        if all(abs(np.log(one.frequency / c.frequency)) > np.log(_APART_AT_LEAST) for c in chosen):
+            chosen.append(one)
+    return chosen[:most]
+
+
+def _at(
+    frequency: float,
+    damping: float,
+    runs: Sequence[np.ndarray],
+    rate: float,
+    beside: Sequence[np.ndarray],
+    missing: np.ndarray,
+    seen: Callable[[np.ndarray], np.ndarray],
+) -> Hidden | None:
+    """Return the mass at one frequency and damping; None where none pulls."""
+    ways = bilinear([frequency**2, 0.0, 0.0], [1.0, 2.0 * damping * frequency, frequency**2], rate)
+    torque = -np.concatenate([lfilter(*ways, run - run[0]) for run in runs])
+    sizes, left = solved([*beside, seen(torque)], missing)
+    inertia, motor = sizes[-1], sizes[-2]
+    return Hidden(inertia, motor + inertia, float(frequency), damping, left) if inertia > 0.0 else None
+
+
+def share_of(mass: Hidden, inertia: float) -> float | None:
+    """Return the share of all inertia that a mass has; None where nothing is left of the motor.
+
+    Args:
+        mass: behind a spring.
+        inertia: of the rigid model, kg m2.
+    """
+    total = inertia + mass.added
+    share = mass.inertia / total if total > 0.0 else 1.0
+    return share if _SHARES[0] < share < _SHARES[1] else None
