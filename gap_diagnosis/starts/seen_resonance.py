@@ -14,6 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import bilinear, lfilter
 
+from ..model.rig_model import Model
+from .other_splits import YIELDS
 from .seen_together import solved
 
 _DAMPED = (0.03, 0.1)  # ratios of damping that are tried
@@ -21,6 +23,7 @@ _APART = 0.05  # from one frequency to the next, relative: about as wide as it i
 _FEWEST_PERIODS = 3.0  # of the lowest frequency, in the shortest run
 _APART_AT_LEAST = 1.2  # ratio of two frequencies that are both taken
 _SHARES = (0.01, 0.99)  # of the inertia behind the spring
+_VISCOUS = ("fvm", "viscous_friction.motor_nm_s_rad")
 
 
 @dataclass(frozen=True)
@@ -102,18 +105,32 @@ def _at(
     """Return the mass at one frequency and damping; None where none pulls."""
     ways = bilinear([frequency**2, 0.0, 0.0], [1.0, 2.0 * damping * frequency, frequency**2], rate)
     torque = -np.concatenate([lfilter(*ways, run - run[0]) for run in runs])
-    sizes, left = solved([*beside, seen(torque)], missing)
-    inertia, motor = sizes[-1], sizes[-2]
-    return Hidden(inertia, motor + inertia, float(frequency), damping, left) if inertia > 0.0 else None
+    *_, motor, inertia = (found := solved([*beside, seen(torque)], missing))[0]
+    if not inertia > 0.0:
+        return None
+    return Hidden(inertia, motor + inertia, float(frequency), damping, found[1])
 
 
-def share_of(mass: Hidden, inertia: float) -> float | None:
-    """Return the share of all inertia that a mass has; None where nothing is left of the motor.
+def with_mass(model: Model, mass: Hidden) -> Model | None:
+    """Return the model of a rigid axis with a mass behind a spring more.
+
+    What damps the mass is a share of the viscous friction, as far as there is any. None where
+    nothing, or all, is left to the motor.
 
     Args:
+        model: that lacks the mass.
         mass: behind a spring.
-        inertia: of the rigid model, kg m2.
     """
-    total = inertia + mass.added
+    total = model.plant["jm"] + mass.added
     share = mass.inertia / total if total > 0.0 else 1.0
-    return share if _SHARES[0] < share < _SHARES[1] else None
+    if not _SHARES[0] < share < _SHARES[1]:
+        return None
+    viscous = sum(size for n, size in {**model.plant, **model.effects}.items() if n in _VISCOUS)
+    yields = {
+        "compliance_rad_nm": 1.0 / mass.stiffness,
+        "link_inertia_share": share,
+        "link_coulomb_share": 0.0,
+        "link_viscous_share": min(mass.drag / viscous, 1.0) if viscous else 0.0,
+    }
+    own = {f"{YIELDS}.{name}": value for name, value in yields.items()}
+    return Model({**model.plant, "jm": total}, {**model.effects, **own})

@@ -21,8 +21,7 @@ from fjr_sim_node import effects as fx
 
 from ..model.evidence import Evidence
 from ..model.rig_model import Model
-from .other_splits import YIELDS
-from .seen_resonance import hidden, share_of
+from .seen_resonance import hidden, with_mass
 from .seen_together import LAWS, Seen, heavier, load_parameters, load_torques, solved
 
 FRICTIONS = tuple(name.split(".")[0] for name in LAWS)
@@ -33,7 +32,6 @@ _FASTEST = 1.0  # ripples of a higher frequency, over the crossover, the observe
 _REST, _FALLS, _SLIDES = 0.03, 0.05, 0.2
 """Of the rms velocity: below the first friction is whatever holds, above the second it may fall
 from breakaway; above the third it slides, though it yields before."""
-_VISCOUS = ("fvm", "viscous_friction.motor_nm_s_rad")
 _PEAKS = 2
 _NEARLY, _ALIKE = 0.95, 4  # of the best; how many of those that explain so much
 
@@ -82,6 +80,11 @@ class SeenTorques:
         self._motion: np.ndarray = np.concatenate(motions, axis=1)
         self._usual_speed = float(np.sqrt(np.mean(self._velocity**2) + 1e-300))
 
+    @property
+    def enough(self) -> bool:
+        """Whether enough is seen to solve for anything, and the model keeps to the motion."""
+        return self._angle.size >= 4 * _PER_CROSSOVER and bool(np.isfinite(self._missing).all())
+
     def _seen(self, torque: np.ndarray) -> np.ndarray:
         """Return what is seen of a torque that the model lacks along the motion, (places,).
 
@@ -102,7 +105,7 @@ class SeenTorques:
         Args:
             effect: one of `LOADS`.
         """
-        if self._angle.size < 4 * _PER_CROSSOVER or not np.isfinite(self._missing).all():
+        if not self.enough:
             return []
         angle, velocity, acceleration = self._motion
         columns = load_torques(effect, angle)
@@ -169,12 +172,8 @@ class SeenTorques:
         return None if min(sizes.values()) <= 0.0 else heavier(self._model, inertia, sizes)
 
     def resonance(self) -> list[Model]:
-        """Return models of a rigid axis with a mass behind a spring more, see `seen_resonance`.
-
-        What damps the mass is a share of the viscous friction, as far as there is any.
-        """
-        plant, effects = self._model.plant, self._model.effects
-        if self._angle.size < 4 * _PER_CROSSOVER or not np.isfinite(self._missing).all():
+        """Return models of a rigid axis with a mass behind a spring more, see `seen_resonance`."""
+        if not self.enough:
             return []
         angle, velocity, acceleration = self._motion
         torques = [np.ones(angle.size), angle, velocity, np.sign(velocity), -acceleration]
@@ -182,21 +181,8 @@ class SeenTorques:
         found = hidden(
             self._angles, self._rate, self._crossover_hz, beside, self._smooth, self._seen
         )
-        viscous = sum(size for n, size in {**plant, **effects}.items() if n in _VISCOUS)
-        models = []
-        for mass in found:
-            if (share := share_of(mass, plant["jm"])) is None:
-                continue
-            yields = {
-                "compliance_rad_nm": 1.0 / mass.stiffness,
-                "link_inertia_share": share,
-                "link_coulomb_share": 0.0,
-                "link_viscous_share": min(mass.drag / viscous, 1.0) if viscous else 0.0,
-            }
-            heavy = {**plant, "jm": plant["jm"] + mass.added}
-            own = {f"{YIELDS}.{name}": value for name, value in yields.items()}
-            models.append(Model(heavy, {**effects, **own}))
-        return models
+        models = [with_mass(self._model, mass) for mass in found]
+        return [model for model in models if model is not None]
 
     def seeds(self, effect: str, tried: np.ndarray) -> list[dict[str, float]]:
         """Return starting points of a ripple, by full parameter names.
