@@ -76,14 +76,9 @@ def hidden(
         seen: makes of a torque of all runs, (samples,), what is seen of it, (places,).
         most: how many are returned.
     """
-    lowest = _FEWEST_PERIODS * rate / min(run.size for run in runs)
-    if not lowest < highest_hz:
-        return []
-    count = int(np.log(highest_hz / lowest) / _APART) + 2
     found = [
         one
-        for frequency in 2.0 * np.pi * np.geomspace(lowest, highest_hz, count)
-        for damping in _DAMPED
+        for frequency, damping in masses(min(run.size for run in runs) / rate, highest_hz)
         if (one := _at(frequency, damping, runs, rate, beside, missing, seen)) is not None
     ]
     chosen: list[Hidden] = []
@@ -91,6 +86,21 @@ def hidden(
         if all(abs(np.log(one.frequency / c.frequency)) > np.log(_APART_AT_LEAST) for c in chosen):
             chosen.append(one)
     return chosen[:most]
+
+
+def masses(shortest_s: float, highest_hz: float) -> list[tuple[float, float]]:
+    """Return the frequencies (rad/s) and damping ratios that are tried.
+
+    Args:
+        shortest_s: length of the shortest run.
+        highest_hz: up to which the torque is known.
+    """
+    lowest = _FEWEST_PERIODS / shortest_s
+    if not lowest < highest_hz:
+        return []
+    count = int(np.log(highest_hz / lowest) / _APART) + 2
+    tried = 2.0 * np.pi * np.geomspace(lowest, highest_hz, count)
+    return [(frequency, damping) for frequency in tried.tolist() for damping in _DAMPED]
 
 
 def _at(
@@ -103,12 +113,26 @@ def _at(
     seen: Callable[[np.ndarray], np.ndarray],
 ) -> Hidden | None:
     """Return the mass at one frequency and damping; None where none pulls."""
-    ways = bilinear([frequency**2, 0.0, 0.0], [1.0, 2.0 * damping * frequency, frequency**2], rate)
-    torque = -np.concatenate([lfilter(*ways, run - run[0]) for run in runs])
+    torque = torque_of_mass(frequency, damping, runs, rate)
     *_, motor, inertia = (found := solved([*beside, seen(torque)], missing))[0]
     if not inertia > 0.0:
         return None
-    return Hidden(inertia, motor + inertia, float(frequency), damping, found[1])
+    return Hidden(inertia, motor + inertia, frequency, damping, found[1])
+
+
+def torque_of_mass(
+    frequency: float, damping: float, runs: Sequence[np.ndarray], rate: float
+) -> np.ndarray:
+    """Return the torque on the motor of a mass of one behind a spring, (samples,) of all runs.
+
+    Args:
+        frequency: of the mass with the motor held, rad/s.
+        damping: its damping ratio then.
+        runs: angle of each run, (samples,), rad.
+        rate: of the samples, Hz.
+    """
+    ways = bilinear([frequency**2, 0.0, 0.0], [1.0, 2.0 * damping * frequency, frequency**2], rate)
+    return -np.concatenate([lfilter(*ways, run - run[0]) for run in runs])
 
 
 def with_mass(model: Model, mass: Hidden) -> Model | None:

@@ -21,7 +21,8 @@ from fjr_sim_node import effects as fx
 
 from ..model.evidence import Evidence
 from ..model.rig_model import Model
-from .seen_resonance import hidden, with_mass
+from .seen_inertia import SeenInertia
+from .seen_resonance import hidden, torque_of_mass, with_mass
 from .seen_together import LAWS, Seen, heavier, load_parameters, load_torques, solved
 
 FRICTIONS = tuple(name.split(".")[0] for name in LAWS)
@@ -183,6 +184,29 @@ class SeenTorques:
         )
         models = [with_mass(self._model, mass) for mass in found]
         return [model for model in models if model is not None]
+
+    def inertia(self, turns: bool) -> SeenInertia | None:
+        """Return what is seen of the inertia of a rigid axis; None where too little is.
+
+        Args:
+            turns: whether the axis is rotary, so that weight goes with the sine of its angle.
+        """
+        if not self.enough:
+            return None
+        angle, velocity, acceleration = self._motion
+        rows = np.abs(self._velocity) > _SLIDES * self._usual_speed
+        beside = [np.ones(angle.size), angle, *([np.sin(angle), np.cos(angle)] if turns else [])]
+        beside += [velocity, np.sign(velocity), velocity * np.abs(velocity)]
+
+        def at_rows(torque: np.ndarray) -> np.ndarray:
+            return self._seen(torque)[rows]
+
+        seen = SeenInertia(
+            self._model.plant["jm"], self._torque[rows], self._smooth[rows], at_rows(acceleration),
+            np.array([at_rows(torque) for torque in beside]),
+            lambda w, zeta: at_rows(torque_of_mass(w, zeta, self._angles, self._rate)),
+        )  # fmt: skip
+        return seen if seen.enough else None
 
     def seeds(self, effect: str, tried: np.ndarray) -> list[dict[str, float]]:
         """Return starting points of a ripple, by full parameter names.
