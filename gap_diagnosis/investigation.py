@@ -21,6 +21,7 @@ from .fits.gains import gain, stands_for
 from .fits.unseen_friction import SCATTER
 from .gates.bag_deviations import GROUPS
 from .gates.bags_gate import as_bags, drift_of_runs, run_changes, scattering
+from .gates.run_inertias import different_inertias, inertias_differ
 from .how_far.ledger import Ledger
 from .how_far.steady_view import SteadyView
 from .model.evidence import Evidence
@@ -253,8 +254,17 @@ def _misses(fitter: CellFitter, fit: CellFit, parts: Sequence[int] | None = None
 def _run_scatter(
     fitter: CellFitter, best: CellFit
 ) -> tuple[Bags | None, dict[str, float], list[str]]:
-    """Return how far parameters scatter from run to run, seen or assumed, and sentences on it."""
-    changes = run_changes(fitter.evidence, best.variance, best.model)
+    """Return how far parameters scatter from run to run, seen or assumed, and sentences on it.
+
+    Where the inertia of runs differs, their friction only seems to scatter: that is not known.
+    """
+    evidence = fitter.evidence
+    changes = run_changes(evidence, best.variance, best.model)
+    if inertias := different_inertias(evidence, best.model):
+        bags = None if changes is None else as_bags(changes, evidence)
+        if bags is not None:
+            bags = bags.model_copy(update={"scatter_known": False})
+        return bags, relative_scatter(bags), [inertias_differ(inertias, evidence.records.linear)]
     if changes is None and fitter.misfit(best) < NOTHING_LEFT:
         return None, {}, []  # what scatters would be left on runs that no fit has seen
     if changes is None:
@@ -262,8 +272,8 @@ def _run_scatter(
         if not moved_by_scatter(best, fitter.runs, scatter).any():
             return None, {}, []
         return None, scatter, [ASSUMED]
-    bags = as_bags(changes, fitter.evidence, fitter.misfit(best) < NOTHING_LEFT)
-    drift = "" if isinstance(fitter.evidence.records, SteadyRuns) else drift_of_runs(bags)
+    bags = as_bags(changes, evidence, fitter.misfit(best) < NOTHING_LEFT)
+    drift = "" if isinstance(evidence.records, SteadyRuns) else drift_of_runs(bags)
     said = [sentence for sentence in (scattering(bags), drift) if sentence]
     return bags, relative_scatter(bags), said
 

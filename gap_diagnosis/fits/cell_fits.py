@@ -17,6 +17,7 @@ from fjr_sim_node import effects as fx
 from ..model.evidence import Evidence
 from ..model.rig_model import Model
 from ..starts.from_parts import from_part
+from ..starts.other_splits import YIELDS
 from ..starts.ripples import Ripples
 from ..starts.ripples_passed import fewest_cycles
 from ..starts.screening import LARGEST, LARGEST_OF_TORQUES, Proposal, Screening, as_they_are
@@ -73,6 +74,8 @@ class CellFitter(ReweightedFits):
         models: list[Model] = []
         if effect in FRICTIONS and not self.evidence.slow:
             models = self._ripples(parent)[1].friction(effect)
+        elif effect == YIELDS and not self.evidence.slow:
+            models = self._ripples(parent)[1].resonance()
         elif effect in PLAYS and self.evidence.twist is not None:
             bare = Model.nominal(self.nominal)
             models = play(self.evidence, self.fit_parts, parent.model, effect, bare)

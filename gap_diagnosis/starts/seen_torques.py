@@ -21,6 +21,8 @@ from fjr_sim_node import effects as fx
 
 from ..model.evidence import Evidence
 from ..model.rig_model import Model
+from .seen_inertia import SeenInertia
+from .seen_resonance import hidden, torque_of_mass, with_mass
 from .seen_together import LAWS, Seen, heavier, load_parameters, load_torques, solved
 
 FRICTIONS = tuple(name.split(".")[0] for name in LAWS)
@@ -54,6 +56,8 @@ class SeenTorques:
         self._simulator, self._every = simulator, every
         self._swings_free = evidence.records.swings_free
         self._ends = np.cumsum([records[index].samples for index in runs])[:-1]
+        self._angles = [records[index].position for index in runs]
+        self._rate = rate
         self._places, columns, motions = [], [], []
         for index, missing in zip(runs, simulator.missing_torque(model, runs), strict=True):
             record = records[index]
@@ -77,6 +81,11 @@ class SeenTorques:
         self._motion: np.ndarray = np.concatenate(motions, axis=1)
         self._usual_speed = float(np.sqrt(np.mean(self._velocity**2) + 1e-300))
 
+    @property
+    def enough(self) -> bool:
+        """Whether enough is seen to solve for anything, and the model keeps to the motion."""
+        return self._angle.size >= 4 * _PER_CROSSOVER and bool(np.isfinite(self._missing).all())
+
     def _seen(self, torque: np.ndarray) -> np.ndarray:
         """Return what is seen of a torque that the model lacks along the motion, (places,).
 
@@ -97,7 +106,7 @@ class SeenTorques:
         Args:
             effect: one of `LOADS`.
         """
-        if self._angle.size < 4 * _PER_CROSSOVER or not np.isfinite(self._missing).all():
+        if not self.enough:
             return []
         angle, velocity, acceleration = self._motion
         columns = load_torques(effect, angle)
@@ -162,6 +171,42 @@ class SeenTorques:
         inertia = 0.0 if self._swings_free else added[-1]
         sizes = {n: effects.get(n, 0.0) + size for n, size in zip(names, added, strict=False)}
         return None if min(sizes.values()) <= 0.0 else heavier(self._model, inertia, sizes)
+
+    def resonance(self) -> list[Model]:
+        """Return models of a rigid axis with a mass behind a spring more, see `seen_resonance`."""
+        if not self.enough:
+            return []
+        angle, velocity, acceleration = self._motion
+        torques = [np.ones(angle.size), angle, velocity, np.sign(velocity), -acceleration]
+        beside = [self._seen(torque) for torque in torques]
+        found = hidden(
+            self._angles, self._rate, self._crossover_hz, beside, self._smooth, self._seen
+        )
+        models = [with_mass(self._model, mass) for mass in found]
+        return [model for model in models if model is not None]
+
+    def inertia(self, turns: bool) -> SeenInertia | None:
+        """Return what is seen of the inertia of a rigid axis; None where too little is.
+
+        Args:
+            turns: whether the axis is rotary, so that weight goes with the sine of its angle.
+        """
+        if not self.enough:
+            return None
+        angle, velocity, acceleration = self._motion
+        rows = np.abs(self._velocity) > _SLIDES * self._usual_speed
+        beside = [np.ones(angle.size), angle, *([np.sin(angle), np.cos(angle)] if turns else [])]
+        beside += [velocity, np.sign(velocity), velocity * np.abs(velocity)]
+
+        def at_rows(torque: np.ndarray) -> np.ndarray:
+            return self._seen(torque)[rows]
+
+        seen = SeenInertia(
+            self._model.plant["jm"], self._torque[rows], self._smooth[rows], at_rows(acceleration),
+            np.array([at_rows(torque) for torque in beside]),
+            lambda w, zeta: at_rows(torque_of_mass(w, zeta, self._angles, self._rate)),
+        )  # fmt: skip
+        return seen if seen.enough else None
 
     def seeds(self, effect: str, tried: np.ndarray) -> list[dict[str, float]]:
         """Return starting points of a ripple, by full parameter names.

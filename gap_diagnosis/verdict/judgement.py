@@ -21,6 +21,7 @@ from ..model.steady_runs import SteadyRuns
 from ..outcome.cause import Cause, Doubted
 from ..outcome.diagnosis import Bags, Candidate, Diagnosis, EvidenceKind, Step, Verdict
 from ..outcome.gap_size import Estimate, Gap, GapFigures, Gaps
+from ..starts.other_splits import YIELDS
 from ..which.found import Found
 from ..which.presence import (
     cell_estimates,
@@ -131,11 +132,17 @@ def judge(
         parameters=estimates,
         notes=[
             *([THIN] if thin else []),
-            *([RINGS] if verdict == "unexplained" and refit.model.rigid else []),
+            *([RINGS] if _may_ring(verdict, best) else []),
             *_on_parameters(verdict, best, fitter),
             *notes,
         ],
     )
+
+
+def _may_ring(verdict: Verdict, best: CellFit) -> bool:
+    """Tell whether a mass behind a spring, that was not found, may be what is left of a gap."""
+    left = verdict in ("unexplained", "partly_explained")
+    return left and best.model.rigid and YIELDS not in best.effects
 
 
 def reproduced(fitter: CellFitter, fit: CellFit) -> float:

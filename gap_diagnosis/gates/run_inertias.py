@@ -1,0 +1,117 @@
+"""Does the inertia differ from run to run, by a payload or by the pose of other joints?
+
+One model cannot hold two inertias: its fit lies between them, and what it leaves would be told as
+friction that scatters. So each run is asked for its own, with friction and load of its own. Laws
+that the model lacks bend that, too; but only another inertia makes one inertia for all runs so much
+worse than one for each, if no mass behind a spring does as well, which is another inertia at each
+frequency.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..model.evidence import Evidence
+from ..model.rig_model import Model
+from ..model.steady_runs import SteadyRuns
+from ..starts.other_splits import YIELDS
+from ..starts.seen_inertia import SeenInertia
+from ..starts.seen_resonance import masses
+from ..starts.seen_torques import SeenTorques
+
+_DIFFERS = 0.1  # of the greatest inertia, between two runs
+_ERRORS = 5.0  # standard errors of the difference of two runs
+_LAW = 0.02  # of each inertia: what no law of a catalogue is right about
+_SHARE = 0.25  # of a run's torque, rms, that accelerates: less of it shows no inertia
+_WORSE = 2.0
+"""Squares that one inertia for all runs leaves over those of one for each. Of 36 random rigs of one
+inertia, whose friction scattered by 2 to 5 %, none left more than 1.4 times as much in runs that
+accelerate enough (more than 2 in two rigs whose runs do not); rigs whose inertia differs by 30 %
+leave 3 to 500 times as much."""
+_LISTED = 8  # runs whose values are all told
+
+
+@dataclass(frozen=True)
+class RunInertia:
+    """The inertia of a run by the name of the run, and its standard error, kg m2."""
+
+    name: str
+    value: float
+    error: float
+
+
+def different_inertias(evidence: Evidence, model: Model) -> list[RunInertia]:
+    """Return the inertia of each run that clearly shows one; empty where it may be one of all.
+
+    Nothing is said of steady periods, which show too few lines; of slow motion, which shows no
+    inertia; of what swings free, which shows ratios to it; nor of an axis that yields.
+
+    Args:
+        evidence: the runs.
+        model: the best model.
+    """
+    records = evidence.records
+    yields = not model.rigid or f"{YIELDS}.compliance_rad_nm" in model.effects
+    if evidence.slow or records.swings_free or isinstance(records, SteadyRuns) or yields:
+        return []
+    found, seen = [], []
+    for index, record in enumerate(records.records):
+        parts = [p for p, part in enumerate(evidence.parts) if part.record == index]
+        own = SeenTorques(evidence, parts, model).inertia(not records.linear) if parts else None
+        if own is not None and own.value > 0.0 and own.share >= _SHARE:
+            found.append(RunInertia(record.name, own.value, own.error))
+            seen.append(own)
+    if len(found) < 2 or not _apart(found):
+        return []
+    shortest_s = min(r.samples for r in records.records) / records.sample_rate_hz
+    tried = masses(shortest_s, evidence.simulator.crossover_hz)
+    return found if tried and _worse_as_one(seen, tried) else []
+
+
+def _apart(found: Sequence[RunInertia]) -> bool:
+    """Tell whether the least and the greatest differ beyond their errors, and enough to matter."""
+    least, most = _ends(found)
+    errors = [np.hypot(run.error, _LAW * run.value) for run in (least, most)]
+    needed = max(_DIFFERS * most.value, _ERRORS * float(np.hypot(*errors)))
+    return most.value - least.value > needed
+
+
+def _ends(found: Sequence[RunInertia]) -> tuple[RunInertia, RunInertia]:
+    """Return the runs of the least and of the greatest inertia."""
+    ordered = sorted(found, key=lambda run: run.value)
+    return ordered[0], ordered[-1]
+
+
+def _worse_as_one(seen: Sequence[SeenInertia], tried: Sequence[tuple[float, float]]) -> bool:
+    """Tell whether one inertia for all runs leaves much more, beside any mass behind a spring."""
+    least = _WORSE * sum(run.missing.size for run in seen)
+    products = (np.sum([run.against(*mass) for run in seen], axis=0) for mass in tried)
+    return all(_left(each) > least for each in products)
+
+
+def _left(products: np.ndarray) -> float:
+    """Return the squares that one inertia and one mass leave, from `SeenInertia.against`."""
+    sizes = np.linalg.lstsq(products[:2, :2], products[:2, 2], rcond=None)[0]
+    return float(products[2, 2] - products[:2, 2] @ sizes)
+
+
+def inertias_differ(found: Sequence[RunInertia], linear: bool) -> str:
+    """Return what to say of runs of different inertia.
+
+    Args:
+        found: from `different_inertias`, not empty.
+        linear: whether the axis is linear, its inertia a mass.
+    """
+    unit, what = ("kg", "mass") if linear else ("kg m2", "inertia")
+    told = found if len(found) <= _LISTED else _ends(found)
+    each = ", ".join(f"{run.value:.3g} in {run.name}" for run in told)
+    only = "" if told is found else f"; the least and the greatest of {len(found)} runs"
+    return (
+        f"The {what} differs from run to run, as with a payload or another pose: {each} ({unit}, "
+        f"by regression of each run that shows it clearly{only}). One model cannot hold them all: its {what} lies "
+        f"between, and what it leaves may be named as something else. Diagnose the runs of each "
+        f"{what} apart, and note with each run what the axis carried."
+    )
