@@ -130,8 +130,11 @@ def arbitrary_bla(
         kept &= moves(grid)
     if not kept.any():
         raise InputError(
-            "at no frequency does the torque follow the reference beyond noise; excite more, or "
-            "map the reference of this record."
+            "at no frequency does the axis follow the torque beyond noise; excite more, or record "
+            "and map a reference."
+            if slope
+            else "at no frequency does the torque follow the reference beyond noise; excite more, "
+            "or map the reference of this record."
         )
     chosen = [fit for fit, keep in zip(fits, kept, strict=True) if fit is not None and keep]
     bla, levels = _estimate(runs, grid[kept], chosen, sample_rate_hz, slope)

@@ -13,8 +13,9 @@ hold) and `importer.write_bags`.
   clock, `split_stamps` joins seconds and nanoseconds, `own_stamps` are of signals that were not
   sampled together; `part` cuts the part that is asked for, `refresh` finds signals that are
   refreshed more slowly than they are logged.
-- Signals: `wraps` adds the turns that an encoder leaves out, `integrals` makes angles of speeds,
-  `made_torque` the torque of a described controller.
+- Signals: `words` restores signs that a log left out, `wraps` turns that an encoder leaves out;
+  `integrals` makes angles of speeds, `made_torque` the torque of a described controller.
 - The kind of run: `repetition` and `coherence` say whether a run is periodic and whether its
-  signals belong together; `describe` tells repeats from realizations.
+  signals belong together; `describe` tells repeats from realizations. `doubts` says what is
+  evidently wrong, of which `impossible` is what no axis gives.
 """

@@ -193,8 +193,8 @@ def _common_lines(records: Sequence[Record], notes: list[str]) -> np.ndarray:
         pairs = zip(record.repetition.excited[own], record.repetition.amplitudes[own], strict=True)
         for line, size in pairs:
             notes.append(
-                f"{record.path.name}: only here line {line} has {size:.3g} rad; it is not counted "
-                "as excited"
+                f"{record.path.name}: only here line {line} has {size:.3g} {_unit(record)}; it is "
+                "not counted as excited"
             )
     return common
 
@@ -206,20 +206,20 @@ def _amplitude(
     amplitudes = np.array([_amplitudes(record, lines) for record in records])
     usual = np.median(amplitudes, axis=0)
     base_hz = records[0].sample_rate_hz / _period(records[0])
-    rms = np.sqrt(np.mean(amplitudes**2, axis=1))
+    rms, unit = np.sqrt(np.mean(amplitudes**2, axis=1)), _unit(records[0])
     for record, own, size in zip(records, amplitudes, rms, strict=True):
         # Scaled as a whole it is another level; a few lines that differ are not.
         if abs(np.median(own / amplitudes[0]) - 1.0) > SAME_LEVEL:
             raise InputError(
                 f"{record.path}: the amplitudes of the reference differ from those of "
-                f"{records[0].path} (rms {size:.3g} and {rms[0]:.3g} rad); say how many levels the "
-                "files hold, or import it into another folder."
+                f"{records[0].path} (amplitude per line {size:.3g} and {rms[0]:.3g} {unit}); say "
+                "how many levels the files hold, or import it into another folder."
             )
         odd = np.flatnonzero(np.abs(own / usual - 1.0) > ODD_LINE)
         for at in odd[:MOST_NAMED]:
             notes.append(
                 f"{record.path.name}: line {lines[at]} ({lines[at] * base_hz:.4g} Hz) has "
-                f"{own[at]:.3g} rad, {abs(own[at] / usual[at] - 1.0):.0%} off the others"
+                f"{own[at]:.3g} {unit}, {abs(own[at] / usual[at] - 1.0):.0%} off the others"
             )
         if odd.size > MOST_NAMED:
             notes.append(f"{record.path.name}: {odd.size - MOST_NAMED} more lines differ so")
@@ -227,6 +227,11 @@ def _amplitude(
     if np.abs(mean - mean.mean()).max() <= ALIKE * mean.mean():
         return float(f"{mean.mean():.4g}")
     return [float(f"{amplitude:.6g}") for amplitude in mean]
+
+
+def _unit(record: Record) -> str:
+    """Return the unit of the reference."""
+    return "m" if is_linear(record.columns) else "rad"
 
 
 def _period(record: Record) -> int:

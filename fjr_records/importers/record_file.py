@@ -12,10 +12,9 @@ from controller_node.transfer_function import TransferFunction
 from fjr_kit.errors import InputError
 
 from ..drive_off import off_ends
-from ..driven import opposes, wrong_sign
-from ..units import may_stick, unit_taken_for_rad
-from . import coherence, part
+from . import coherence, impossible, part
 from .columns import read_columns
+from .doubts import doubts_of_signals, doubts_of_values
 from .import_map import OWN_TIME, TIME, Column, is_linear, is_time, refuse_both_axes
 from .integrals import DRIFTS, integrals
 from .made_torque import MADE, ONCE, SWINGS_FREE, made_torque
@@ -24,11 +23,11 @@ from .part import LEAST_SAMPLES
 from .repetition import Repetition, find_repetition, insists
 from .stamps import FASTEST_HZ, LONGEST_S
 from .timing import Timing, of_one_clock, of_own_clocks, resample
+from .words import with_sign
 from .wraps import without_wraps
 
 SYMBOLS = {"reference": "r", "torque": "u", "position": "y", "link": "q"}
 FASTER = "its controller runs faster than it is sampled, so it is taken as no periodic run"
-_HALF = 2**15
 
 
 @dataclass(frozen=True)
@@ -121,15 +120,11 @@ def read_samples(path: Path, options: ImportOptions) -> Samples:
     arrays, headings = read_columns(path, [column.name for column in given.values()])
     columns = {q: each.read_as(path, q, headings[each.name]) for q, each in given.items()}
     refuse_both_axes(f"{path}:", columns)
-    unsigned = [
-        q for q, column in columns.items() if not is_time(q) and _lost_sign(arrays[column.name])
-    ]
-    for name in {columns[quantity].name for quantity in unsigned}:
-        arrays[name] = np.where(arrays[name] >= _HALF, arrays[name] - 2 * _HALF, arrays[name])
-    notes = tuple(
-        f"{quantity} is a 16-bit word that was read without its sign: 65535 is taken as -1"
-        for quantity in unsigned
-    )
+    notes: tuple[str, ...] = ()
+    for name in dict.fromkeys(column.name for q, column in columns.items() if not is_time(q)):
+        mapped = [q for q, column in columns.items() if column.name == name and not is_time(q)]
+        arrays[name], note = with_sign(" and ".join(mapped), arrays[name])
+        notes += () if note is None else (note,)
     notes += tuple(
         f"{quantity} is {column.name} with the nanoseconds of {headings[column.name].nanoseconds}"
         for quantity, column in columns.items()
@@ -176,7 +171,9 @@ def read_samples(path: Path, options: ImportOptions) -> Samples:
             f"{LEAST_SAMPLES} samples, in at most {LONGEST_S:g} s."
         )
     said = (each.contradiction(q, headings[each.name]) for q, each in columns.items())
-    return Samples(path, columns, values, timing, notes, tuple(doubt for doubt in said if doubt))
+    own = timing.stamps_s.get("position")
+    doubts = doubts_of_values(values, columns, timing.rate_hz, own)
+    return Samples(path, columns, values, timing, notes, (*filter(None, said), *doubts))
 
 
 def _of_one_length(
@@ -195,15 +192,6 @@ def _of_one_length(
                 f"{quantity}{OWN_TIME}=COLUMN maps stamps of its own."
             )
     return values
-
-
-def _lost_sign(column: np.ndarray) -> bool:
-    """Tell whether whole numbers up to 65535 crowd at both ends, with nothing between."""
-    column = column[np.isfinite(column)]
-    if column.size < 2 or column.min() < 0 or not _HALF <= column.max() < 2 * _HALF:
-        return False
-    between = (column > _HALF // 2) & (column < 3 * _HALF // 2)
-    return not between.any() and bool((column < _HALF).any()) and bool((column % 1 == 0).all())
 
 
 def understand(
@@ -247,15 +235,11 @@ def understand(
     else:
         found = cannot
     repetition = found if isinstance(found, Repetition) else None
-    doubts = samples.doubts + _unit_doubts(path, signals, repetition, columns)
-    if not (np.ptp(signals["u"]) > 0 or options.swings_free):
-        doubts += ("the torque is constant, so no response can be told from this run",)
-    if (against := wrong_sign(signals["u"], signals["y"])) is not None:
-        doubts += (f"{against}: --map torque=-COLUMN or position=-COLUMN turns it",)
-    if "r" in signals and (against := opposes(signals["r"], signals["y"])) is not None:
-        doubts += (f"{against}: --map reference=-COLUMN or position=-COLUMN turns it",)
+    doubts = doubts_of_signals(
+        path, signals, repetition, columns, options.swings_free, samples.doubts
+    )
     off = off_ends(signals["u"], signals["y"], rate_hz) if repetition is None else None
-    if off is not None:
+    if off is not None and impossible.TORQUE not in doubts:
         unit = "N" if is_linear(columns) else "N m"
         notes += (f"{off.told(rate_hz, unit)}; analysis and diagnosis leave these out",)
     other = coherence.unrelated(signals, repetition)
@@ -265,29 +249,3 @@ def understand(
         signals = {symbol: each[: repetition.samples] for symbol, each in signals.items()}
         notes += repetition.notes
     return Record(path, columns, rate_hz, signals, timing, found, notes, doubts)
-
-
-def _unit_doubts(
-    path: Path,
-    signals: Mapping[str, np.ndarray],
-    repetition: Repetition | None,
-    columns: Mapping[str, Column],
-) -> tuple[str, ...]:
-    """Refuse angles in different units; doubt them where a factor, or a rig that sticks, may be."""
-    pairs = []
-    if "reference" in columns and not columns["reference"].by_factor:  # else it is a current, say
-        pairs.append(("position", "reference", coherence.angle_ratio(signals, repetition)))
-    if "q" in signals and np.ptp(signals["q"]) > 0:
-        ratio = float(np.std(signals["q"]) / np.std(signals["y"]))
-        pairs.append(("link", "position", ratio))
-    doubts = []
-    for one, other, ratio in pairs:
-        doubt = coherence.unit_doubt(ratio, one, other)
-        if doubt is None:
-            continue
-        meant = columns[one].by_factor or columns[other].by_factor
-        meant = meant or (one == "link" and unit_taken_for_rad(max(ratio, 1.0 / ratio)) is None)
-        if not (meant or (one == "position" and may_stick(ratio))):
-            raise InputError(f"{path}: {doubt}.")
-        doubts.append(doubt)
-    return tuple(doubts)
