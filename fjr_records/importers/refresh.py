@@ -120,7 +120,8 @@ def _told(samples: Samples, k: int) -> Samples:
     k, _ = refreshed_every(samples.values["torque"])
     if k == 1:
         return samples
-    note = f"the torque changes only at every {_nth(k)} sample, as of a controller of {rate / k:g} Hz or of a stepped excitation"
+    held = f"the torque changes only at every {_nth(k)} sample"
+    note = f"{held}, as of a controller of {rate / k:g} Hz or of a stepped excitation"
     return replace(samples, notes=(*samples.notes, note))
 
 

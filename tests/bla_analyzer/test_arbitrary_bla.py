@@ -134,3 +134,10 @@ def test_a_reference_of_another_run_gives_nothing_or_nothing_reliable():
 def test_a_short_record_is_refused_with_the_reason():
     with pytest.raises(InputError, match="too short"):
         arbitrary_bla([run_of([np.random.default_rng(0).standard_normal((3, 20))], 100.0)], 100.0)
+
+
+@pytest.mark.parametrize(("slope", "said"), [(True, "follow the torque"), (False, "reference of")])
+def test_what_moves_nothing_is_told_by_what_was_recorded(slope, said):
+    runs = [run_of([np.random.default_rng(0).standard_normal((3, 4000))], 100.0)]
+    with pytest.raises(InputError, match=said):
+        arbitrary_bla(runs, 100.0, slope=slope, moves=lambda at: np.zeros(at.shape, bool))
