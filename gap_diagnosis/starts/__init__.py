@@ -7,6 +7,7 @@ of each effect of the `catalogue`, in the measures of `scales`.
   `ripples` finds the cycles of ripples (`ripples_passed`: how much of one is seen), and
   `from_parts` begins a law of several parts where the fit of one part has ended.
 - Read off the record by regression: from the missing torque (`seen_torques`), of frictions, load
-  and inertia at once (`seen_together`), of a mass behind a spring (`seen_resonance`), from the
-  twist of a transmission (`seen_twist`), and for another split of the inertia (`other_splits`).
+  and inertia at once (`seen_together`), of a mass behind a spring (`seen_resonance`), of the
+  inertia of one run (`seen_inertia`), from the twist of a transmission (`seen_twist`), and for
+  another split of the inertia (`other_splits`).
 """
