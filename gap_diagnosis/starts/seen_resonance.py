@@ -18,8 +18,10 @@ from ..model.rig_model import Model
 from .other_splits import YIELDS
 from .seen_together import solved
 
-_DAMPED = (0.03, 0.1)  # ratios of damping that are tried
-_APART = 0.05  # from one frequency to the next, relative: about as wide as it is damped
+_APART = 0.1  # from one frequency to the next, relative
+_COARSE = 0.07  # ratio of damping of the first tries: peaks are as wide as frequencies are apart
+_NEAR, _DAMPED = (0.95, 1.0, 1.05), (0.03, 0.1)
+"""Frequencies over the best of the first tries, and ratios of damping, that are tried then."""
 _FEWEST_PERIODS = 3.0  # of the lowest frequency, in the shortest run
 _APART_AT_LEAST = 1.2  # ratio of two frequencies that are both taken
 _SHARES = (0.01, 0.99)  # of the inertia behind the spring
@@ -76,20 +78,28 @@ def hidden(
         seen: makes of a torque of all runs, (samples,), what is seen of it, (places,).
         most: how many are returned.
     """
-    found = [
-        one
-        for frequency, damping in masses(min(run.size for run in runs) / rate, highest_hz)
-        if (one := _at(frequency, damping, runs, rate, beside, missing, seen)) is not None
-    ]
+
+    def best(tried: Sequence[tuple[float, float]]) -> list[Hidden]:
+        each = (_at(*one, runs, rate, beside, missing, seen) for one in tried)
+        return sorted((one for one in each if one is not None), key=_left)
+
     chosen: list[Hidden] = []
-    for one in sorted(found, key=lambda one: one.left):
+    for one in best(masses(min(run.size for run in runs) / rate, highest_hz)):
         if all(abs(np.log(one.frequency / c.frequency)) > np.log(_APART_AT_LEAST) for c in chosen):
             chosen.append(one)
-    return chosen[:most]
+    refined = [
+        min([one, *best([(f * one.frequency, z) for f in _NEAR for z in _DAMPED])], key=_left)
+        for one in chosen[:most]
+    ]
+    return sorted(refined, key=_left)
+
+
+def _left(one: Hidden) -> float:
+    return one.left
 
 
 def masses(shortest_s: float, highest_hz: float) -> list[tuple[float, float]]:
-    """Return the frequencies (rad/s) and damping ratios that are tried.
+    """Return the frequencies (rad/s) and damping ratios that are tried first.
 
     Args:
         shortest_s: length of the shortest run.
@@ -100,7 +110,7 @@ def masses(shortest_s: float, highest_hz: float) -> list[tuple[float, float]]:
         return []
     count = int(np.log(highest_hz / lowest) / _APART) + 2
     tried = 2.0 * np.pi * np.geomspace(lowest, highest_hz, count)
-    return [(frequency, damping) for frequency in tried.tolist() for damping in _DAMPED]
+    return [(frequency, _COARSE) for frequency in tried.tolist()]
 
 
 def _at(
