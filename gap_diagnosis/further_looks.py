@@ -16,7 +16,7 @@ from fjr_sim_node import effects as fx
 from .investigation import Investigation
 from .outcome.diagnosis import Diagnosis
 from .starts.search_space import farthest
-from .verdict.notes import at_limits
+from .verdict.notes import MASSES_AND_SPRING, at_limits
 
 WIDER, CLOSER = 5.0, 0.2
 """How many tolerances a further look takes for one."""
@@ -85,7 +85,7 @@ def said(second: Diagnosis, nominal: Mapping[str, float], tolerance: float, time
     far = [
         f"{name} is {100.0 * abs(by):.0f} % {'above' if by > 0.0 else 'below'} it"
         for name, by in off.items()
-        if abs(by) > tolerance and name in ("jm", "j", "k0")
+        if abs(by) > tolerance and name in MASSES_AND_SPRING
     ]
     told = f": {', '.join(far)}" if far else ""
     return (
@@ -100,7 +100,8 @@ def _ended(found: Investigation) -> bool:
     if found.fitted is None:
         return False
     best = found.fitted.found.best
-    return bool(at_limits(best.space, best.solution.x, best.model.plant))
+    ended = at_limits(best.space, best.solution.x, best.model.plant, MASSES_AND_SPRING)
+    return bool(ended)
 
 
 def _has_gain(diagnosis: Diagnosis) -> bool:

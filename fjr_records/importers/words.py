@@ -49,9 +49,10 @@ def _sign_bit(column: np.ndarray) -> int | None:
     column = column[np.isfinite(column)]
     if column.size < 2 or column.min() < 0 or (column % 1 != 0).any():
         return None
-    bit = 2 ** int(np.log2(max(column.max(), 1.0)))
+    place = int(np.log2(max(column.max(), 1.0)))
+    bit = 2**place
     high = float(np.mean(column >= bit))
-    if int(np.log2(bit)) not in _SIGN_BITS or not _BOTH_WAYS < high < 1.0 - _BOTH_WAYS:
+    if place not in _SIGN_BITS or not _BOTH_WAYS < high < 1.0 - _BOTH_WAYS:
         return None
     passes = np.diff(column >= bit)
     steps = (np.abs(np.diff(each)[passes]).mean() for each in (_by_magnitude(column, bit), column))

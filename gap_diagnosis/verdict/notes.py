@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -19,6 +19,9 @@ from ..starts.other_splits import YIELDS
 from ..starts.search_space import Space
 from ..which.found import Found
 from ..which.presence import over_usual
+
+MASSES_AND_SPRING = ("jm", "j", "k0")
+_TOLD = (*MASSES_AND_SPRING, "fs", "fsm", "fv", "fvm")
 
 _SHOWN = 3
 """Most runs of which the same is said."""
@@ -126,7 +129,7 @@ def of_records(evidence: Evidence, nominal: Mapping[str, float]) -> list[str]:
 def of_fit(found: Found) -> list[str]:
     """Return what a reader must know of the search and of the fit in which it ended."""
     best = found.best
-    notes = [*found.notes, *at_limits(best.space, best.solution.x, best.model.plant)]
+    notes = [*found.notes, *at_limits(best.space, best.solution.x, best.model.plant, _TOLD)]
     notes += [
         unusual(best.model, effect)
         for effect in best.effects
@@ -153,17 +156,20 @@ def unusual(model: Model, effect: str) -> str:
     )
 
 
-def at_limits(space: Space, x: np.ndarray, plant: Mapping[str, float]) -> list[str]:
-    """Return a note on inertias and stiffness that ended as far from the datasheet as fits may go.
+def at_limits(
+    space: Space, x: np.ndarray, plant: Mapping[str, float], names: Collection[str]
+) -> list[str]:
+    """Return a note on parameters that ended as far from the datasheet as fits may go.
 
     Args:
         space: of the fit.
         x: where it ended.
         plant: the base parameters there.
+        names: of the parameters to tell of.
     """
     told = []
     for (name, stated), ended in zip(space.nominal.items(), space.at_limits(x), strict=True):
-        if name in ("jm", "j", "k0") and ended:
+        if name in names and ended:
             off = 100.0 * (plant[name] / stated - 1.0)
             told.append(f"{name} {abs(off):.0f} % {'above' if off > 0.0 else 'below'}")
     if not told:

@@ -169,7 +169,7 @@ def test_how_many_frequencies_carry_an_estimate_is_told_and_a_few_are_no_respons
 @pytest.mark.parametrize(
     ("turned", "said"),
     [
-        ("", "nothing speaks against the signs of torque, position and reference"),
+        ("", "the signs of torque, position and reference go together"),
         ("u", "the torque brakes the motion more than it drives it"),
         ("r", "the position goes against the reference"),
     ],

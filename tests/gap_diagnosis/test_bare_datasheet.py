@@ -46,8 +46,8 @@ def test_the_whole_friction_is_named_and_no_part_of_it_in_its_place(found):
 
 def test_a_datasheet_whose_friction_is_far_off_hides_no_cause():
     made = records({"torque_bias.torque_nm": BIAS_NM}, runs=3, scatter=0.03, seconds=6.0)
-    third = {name: NOMINAL[name] / 3.0 for name in ("fs", "fsm", "fv", "fvm")}
-    diagnosis = investigate(made, {**NOMINAL, **third}, effects=LOOKED_FOR).diagnosis
+    half = {name: NOMINAL[name] / 2.0 for name in ("fs", "fsm", "fv", "fvm")}
+    diagnosis = investigate(made, {**NOMINAL, **half}, effects=LOOKED_FOR).diagnosis
     assert diagnosis.effects == ["torque_bias"]
     sizes = {name: found.value for name, found in diagnosis.parameters.items()}
     assert abs(sizes["torque_bias.torque_nm"]) == pytest.approx(BIAS_NM, rel=0.1)

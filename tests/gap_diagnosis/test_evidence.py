@@ -276,7 +276,7 @@ def test_a_true_cause_is_the_same_at_all_levels_and_a_substitute_is_not():
 def test_a_datasheet_in_a_wrong_unit_is_told_by_the_bound_at_which_the_fit_ends(stated, words):
     nominal = {**NOMINAL, "jm": stated * NOMINAL["jm"]}
     refit = CellFitter(Evidence(records(seconds=5.0), nominal), nominal, 0.1).refit()
-    said = at_limits(refit.space, refit.solution.x, refit.model.plant)
+    said = at_limits(refit.space, refit.solution.x, refit.model.plant, ("jm", "j", "k0"))
     assert len(said) == (words is not None)
     assert words is None or words in said[0]
 
