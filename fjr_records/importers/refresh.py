@@ -41,16 +41,14 @@ def refreshed_every(signal: np.ndarray) -> tuple[int, int]:
     if changes.size < _FEWEST:
         return 1, 0
     between = np.diff(changes)
-    usual = int(np.bincount(np.minimum(between, signal.size // _FEWEST)).argmax())
+    k = int(np.bincount(np.minimum(between, signal.size // _FEWEST)).argmax())
     sizes = np.abs(steps[changes - 1])
     if np.mean(sizes > _LARGE * sizes.min()) < _OFTEN:
         return 1, 0
-    for k in range(usual, 1, -1):
-        counts = np.bincount(changes % k, minlength=k)
-        first = int(counts.argmax())
-        if counts[first] >= _REGULAR * changes.size and np.mean(between == k) >= _SEEN:
-            return k, first
-    return 1, 0
+    counts = np.bincount(changes % k, minlength=k)
+    first = int(counts.argmax())
+    regular = counts[first] >= _REGULAR * changes.size and np.mean(between == k) >= _SEEN
+    return (k, first) if regular and k > 1 else (1, 0)
 
 
 def at_the_rate_of_angles(samples: Sequence[Samples], *, fixed: bool) -> list[Samples]:
