@@ -44,6 +44,7 @@ from .verdict.tested_causes import Tested
 from .which.equivalents import founded, partners
 from .which.exchange import with_the_better_one
 from .which.found import Found
+from .which.noisy_torque import beside_torque_noise, with_its_bias
 from .which.rounding import beside_rounding
 from .which.stepwise import Stepwise
 from .which.torque_timing import Timing, timed
@@ -188,6 +189,7 @@ def investigate_runs(
     fitter = timing.fitter
     if found.best.effects:
         fitter, found = beside_rounding(fitter, found, progress)
+    fitter, found, unfelt = beside_torque_noise(fitter, found, progress)
     evidence, heard = fitter.evidence, [*timing.notes]
     progress("scatter from run to run")
     bags, scatter, said = _run_scatter(fitter, found.best)
@@ -211,6 +213,8 @@ def investigate_runs(
     notes = [*records.notes, *cut, *heard, *of_records(evidence, nominal), *of_fit(found)]
     diagnosis = judge(fitter, model, found, tested, alternatives, bags, scatter, notes)
     rivals = tuple(fit for fits in tied.values() for fit in fits)
+    if unfelt is not None:
+        diagnosis = with_its_bias(diagnosis, fitter, found.best, unfelt)
     chosen_of = {"contenders": contenders(fitter, found, rivals)}
     diagnosis = diagnosis.model_copy(update=chosen_of)
     if order.effects is None or ROUNDING in order.effects:

@@ -260,6 +260,29 @@ class RecordSimulator:
             return np.full((3, self.records.records[index].samples), np.nan)
         return _signals(model, run)
 
+    def pushed(self, model: Model, index: int, torques: np.ndarray) -> list[np.ndarray]:
+        """Return y, u and q of a model in one run that its torque drives, with torques beside it.
+
+        Args:
+            model: the model.
+            index: of the run.
+            torques: (runs, samples), N m.
+
+        Returns:
+            float64 (3, samples) for each; NaN where the motion diverges.
+        """
+        drive = self.drive(index)
+        assert drive.command is not None
+
+        def play(torque: np.ndarray) -> np.ndarray:
+            beside = replace(drive, command=drive.command + torque)
+            try:
+                return _signals(model, beside.simulated(self._rate, *self.coefficients(model)))
+            except InputError:
+                return np.full((3, torque.size), np.nan)
+
+        return run_parallel(play, list(torques))
+
     def _one(self, job: tuple[Model, int]) -> np.ndarray:
         model, index = job
         if self.too_stiff(model, index):

@@ -1,0 +1,237 @@
+"""Noise of a recorded torque that drives the model: its sensor's, which the rig never felt.
+
+Where nobody knows the loop, the recorded torque moves the model, and so does the noise in it. How
+strong that noise is cannot be told from the torque alone: a rig does feel what a controller makes of
+the noise of its encoder. But noise which it did not feel leaves errors that are, as torques, alike
+at all frequencies, and no stronger than what the torque holds where it holds least. What friction,
+a spring or an inertia would leave is strong in some bands and weak in others. So the noise is that
+which the band allows in which it explains most of the error at once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.signal import welch
+
+from fjr_kit.telling import Progress
+from fjr_records.records import RecordSet
+
+from ..fits.cell_fits import CellFitter
+from ..fits.comparison import NOTHING_LEFT, CellFit
+from ..model.evidence import Evidence
+from ..model.rig_model import Model
+from ..model.steady_runs import SteadyRuns
+from ..outcome.diagnosis import Diagnosis
+from ..outcome.gap_size import Estimate
+from .found import Found
+
+_OCTAVES = 6
+_HIGHEST = 0.8
+"""Of half the sample rate: above it a filter may have taken the noise away."""
+_FEWEST_LINES = 4
+_PER_SEGMENT = 1024
+_MOST = 0.1
+"""Of the squared torque: where it holds more in all octaves, that is what excites the rig."""
+_FEWEST_ERRORS = 60
+"""Of a cell, and noise that is more than the position's there: what else shows no noise."""
+_SIMULATED = 4  # simulations of each run with noise of its torque
+_SEED = 1
+_REPEATED = 2  # fits with as much noise again
+
+
+@dataclass(frozen=True)
+class TorqueNoise:
+    """Noise of a recorded torque.
+
+    Attributes:
+        rms: of the samples of each run, (runs,), N m.
+        share: of all runs together, over the rms of their torque.
+        power: mean square of an error that it makes in each cell, (cells,), rad2.
+    """
+
+    rms: np.ndarray
+    share: float
+    power: np.ndarray
+
+    @property
+    def note(self) -> str:
+        """What a reader must know of it."""
+        return (
+            f"The recorded torque, which drives the model, holds noise of {self.share:.1%} of its "
+            "rms that did not move the rig: errors are as such noise makes them, alike as torques "
+            "in all bands, and no stronger than what the torque holds where it holds least. It "
+            "counts as noise. What is driven by it seems more sluggish than it is, and the "
+            "intervals reach to where sizes would be without it."
+        )
+
+    def beside(self, records: RecordSet, seed: int) -> RecordSet:
+        """Return the records with as much noise of the torque again."""
+        random = np.random.default_rng(seed)
+        noisy = [
+            replace(r, torque=r.torque + rms * random.standard_normal(r.samples))
+            for r, rms in zip(records.records, self.rms.tolist(), strict=True)
+        ]
+        return replace(records, records=tuple(noisy))
+
+
+def beside_torque_noise(
+    fitter: CellFitter, found: Found, progress: Progress = lambda _: None
+) -> tuple[CellFitter, Found, TorqueNoise | None]:
+    """Return what fits beside noise of the torque, and its fits, if there is any that is seen.
+
+    Args:
+        fitter: of the fits.
+        found: the refit of the base parameters, and perhaps causes.
+        progress: told that the noise is simulated.
+
+    Returns:
+        the fitter, the fits, and the noise; what was given, and None, where none is seen.
+    """
+    evidence = fitter.evidence
+    if not _driven(evidence) or fitter.left_in_a_band(found.best) < NOTHING_LEFT:
+        return fitter, found, None
+    progress("noise of the torque")
+    noise = torque_noise(evidence, found.best.model)
+    if noise is None:
+        return fitter, found, None
+    power = evidence.noise_power + noise.power
+    beside = evidence.played_by(evidence.player, power)
+    other = CellFitter(beside, fitter.nominal, fitter.tolerance)
+    steps = [other.refit(), *(other.taken_over(fit) for fit in found.steps[1:])]
+    rivals = {
+        count: [_judged_anew(other, fit) for fit in fits] for count, fits in found.rivals.items()
+    }
+    notes = (*found.notes, noise.note)
+    return other, replace(found, steps=steps, rivals=rivals, notes=notes), noise
+
+
+def with_its_bias(
+    diagnosis: Diagnosis, fitter: CellFitter, fit: CellFit, noise: TorqueNoise
+) -> Diagnosis:
+    """Return a diagnosis whose intervals reach to where sizes would be without the noise.
+
+    Noise of what drives a model biases its fit (errors in variables). As much noise again moves the
+    fit by as much again, to first order (simulation extrapolation: Cook, Stefanski 1994, JASA 89).
+
+    Args:
+        diagnosis: of the fit.
+        fitter: that made the fit, beside the noise.
+        fit: the best one.
+        noise: of the torque.
+    """
+    evidence = fitter.evidence
+    power = evidence.noise_power + noise.power
+    moved = np.zeros(fit.solution.x.size)
+    for seed in range(_REPEATED):
+        records = noise.beside(evidence.records, seed)
+        again = Evidence(records, fitter.nominal)
+        twice = CellFitter(again.played_by(again.player, power), fitter.nominal, fitter.tolerance)
+        moved += (twice.taken_over(fit).solution.x - fit.solution.x) / _REPEATED
+    space = fit.space
+    without = space.model(np.clip(fit.solution.x - moved, *space.bounds()))
+    values = {**without.plant, **without.effects}
+    parameters = {n: _reaching(e, values.get(n)) for n, e in diagnosis.parameters.items()}
+    causes = [
+        cause.model_copy(update={"parameters": {n: parameters[n] for n in cause.parameters}})
+        for cause in diagnosis.causes
+    ]
+    return diagnosis.model_copy(update={"parameters": parameters, "causes": causes})
+
+
+def _reaching(found: Estimate, without: float | None) -> Estimate:
+    """Return an interval that reaches as much further as its value would be moved."""
+    if without is None or found.value is None or found.low is None or found.high is None:
+        return found
+    by = without - found.value
+    return found.model_copy(
+        update={"low": found.low + min(by, 0.0), "high": found.high + max(by, 0.0)}
+    )
+
+
+def _judged_anew(fitter: CellFitter, fit: CellFit) -> CellFit:
+    return replace(fit, left=fitter.left_by(fit.model, fit.variance))
+
+
+def _driven(evidence: Evidence) -> bool:
+    """Tell whether the recorded torque drives the model in all runs, and nothing shows its noise.
+
+    Mean periods show what scatters between them, of the torque as well.
+    """
+    if evidence.slow or evidence.records.swings_free or not evidence.noise.known:
+        return False
+    steady = isinstance(evidence.records, SteadyRuns)
+    return not steady and not any(evidence.player.loop.laws)
+
+
+def torque_noise(evidence: Evidence, model: Model) -> TorqueNoise | None:
+    """Return the noise of the torque that the errors of a model show; None where they show none.
+
+    Args:
+        evidence: records whose torque drives the model.
+        model: the best one.
+    """
+    torques = [record.torque for record in evidence.records.records]
+    powers = [float(np.mean(torque**2)) for torque in torques]
+    most = [most_noise(torque) for torque in torques]
+    if np.sum(np.square(most)) > _MOST * np.sum(powers):
+        return None
+    parts = evidence.parts_for("fit", "select")
+    cells = evidence.cell_of(parts)
+    numbers = np.bincount(cells, minlength=evidence.cells)
+    made = _made(evidence, model, most)
+    if made is None:
+        return None
+    known = evidence.floor(parts)
+    left = evidence.mean_squares(evidence.errors([model], parts)[0], parts)
+    band = np.arange(evidence.cells) % evidence.bands
+    shows = (numbers >= _FEWEST_ERRORS) & (made > known) & (band > 0)
+    if not shows.any():
+        return None
+    share = min(float(((left - known)[shows] / made[shows]).min()), 1.0)
+    power = share * made
+    if not np.any(power[shows] > known[shows]):
+        return None
+    rms = np.sqrt(share) * np.array(most)
+    return TorqueNoise(rms, float(np.sqrt(np.sum(rms**2) / np.sum(powers))), power)
+
+
+def most_noise(torque: np.ndarray) -> float:
+    """Return the rms of the strongest white noise that a recorded torque can hold, N m.
+
+    Args:
+        torque: float64 (samples,), N m.
+    """
+    frequency, density = welch(torque, nperseg=min(_PER_SEGMENT, torque.size))
+    frequency = 2.0 * frequency  # over half the sample rate
+    found = []
+    for octave in range(_OCTAVES):
+        high = _HIGHEST / 2**octave
+        inside = density[(frequency > high / 2.0) & (frequency <= high)]
+        if inside.size >= _FEWEST_LINES:
+            found.append(float(np.mean(inside)))
+    return float(np.sqrt(min(found) / 2.0)) if found else 0.0
+
+
+def _made(evidence: Evidence, model: Model, rms: list[float]) -> np.ndarray | None:
+    """Return the mean square of the errors that noise of each torque makes in each cell, rad2.
+
+    None where the motion diverges.
+    """
+    random = np.random.default_rng(_SEED)
+    player = evidence.player
+    smooth = player.run([model], range(len(rms)))[0]
+    squares: list[np.ndarray] = [np.empty(0)] * len(rms)
+    for index, size in enumerate(rms):
+        samples = evidence.records.records[index].samples
+        noises = size * random.standard_normal((_SIMULATED, samples))
+        runs = player.pushed(model, index, noises)
+        if not all(np.isfinite(run[0]).all() for run in (*runs, smooth[index])):
+            return None
+        lines = evidence.lines_of(smooth[index], index)
+        moved = [evidence.lines_of(run, index) - lines for run in runs]
+        squares[index] = np.mean(np.square(moved), axis=0)
+    every = range(len(evidence.parts))
+    cuts = (squares[evidence.parts[p].record][evidence.parts[p].windows].ravel() for p in every)
+    return evidence.mean_squares(np.sqrt(np.concatenate(list(cuts))), every)
