@@ -242,46 +242,29 @@ class RecordSimulator:
             held_at=self._held_at[index],
         )  # fmt: skip
 
-    def disturbed(self, model: Model, index: int, noise: np.ndarray) -> np.ndarray:
-        """Return y, u and q of a model in one run, to which nothing is added, with encoder noise.
+    def disturbed(
+        self, model: Model, index: int, noise: np.ndarray | None, torque: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Return y, u and q of a model in one run, to which nothing is added, with noise.
 
         Args:
             model: the model.
             index: of the run.
-            noise: (samples,), rad.
+            noise: of the encoder, (samples,), rad; None for none.
+            torque: noise of the torque that drives the run, (samples,), N m; None for none.
 
         Returns:
             float64 (3, samples); NaN where the motion diverges.
         """
         try:
             drive = self.drive(index)
+            if torque is not None:
+                assert drive.command is not None
+                drive = replace(drive, command=drive.command + torque)
             run = drive.simulated(self._rate, *self.coefficients(model), noise)
         except InputError:
             return np.full((3, self.records.records[index].samples), np.nan)
         return _signals(model, run)
-
-    def pushed(self, model: Model, index: int, torques: np.ndarray) -> list[np.ndarray]:
-        """Return y, u and q of a model in one run that its torque drives, with torques beside it.
-
-        Args:
-            model: the model.
-            index: of the run.
-            torques: (runs, samples), N m.
-
-        Returns:
-            float64 (3, samples) for each; NaN where the motion diverges.
-        """
-        drive = self.drive(index)
-        assert drive.command is not None
-
-        def play(torque: np.ndarray) -> np.ndarray:
-            beside = replace(drive, command=drive.command + torque)
-            try:
-                return _signals(model, beside.simulated(self._rate, *self.coefficients(model)))
-            except InputError:
-                return np.full((3, torque.size), np.nan)
-
-        return run_parallel(play, list(torques))
 
     def _one(self, job: tuple[Model, int]) -> np.ndarray:
         model, index = job

@@ -1,16 +1,17 @@
 """Noise of a recorded torque that drives the model: its sensor's, which the rig never felt.
 
-Where nobody knows the loop, the recorded torque moves the model, and so does the noise in it. How
-strong that noise is cannot be told from the torque alone: a rig does feel what a controller makes of
-the noise of its encoder. But noise which it did not feel leaves errors that are, as torques, alike
-at all frequencies, and no stronger than what the torque holds where it holds least. What friction,
-a spring or an inertia would leave is strong in some bands and weak in others. So the noise is that
-which the band allows in which it explains most of the error at once.
+Where nobody knows the loop, the recorded torque moves the model, and so does the noise in it. Its
+size cannot be told from the torque alone: a rig does feel what a controller makes of the noise of
+its encoder. But noise that the rig did not feel leaves errors which are, as torques, alike at all
+frequencies, and no stronger than what the torque holds where it holds least. What friction, a
+spring or an inertia leaves is strong in some bands and weak in others. So the errors of the band
+in which there is the least for it say how strong the noise may be.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from scipy.signal import welch
@@ -22,6 +23,7 @@ from ..fits.cell_fits import CellFitter
 from ..fits.comparison import NOTHING_LEFT, CellFit
 from ..model.evidence import Evidence
 from ..model.rig_model import Model
+from ..model.simulated_rig import run_parallel
 from ..model.steady_runs import SteadyRuns
 from ..outcome.diagnosis import Diagnosis
 from ..outcome.gap_size import Estimate
@@ -226,7 +228,7 @@ def _made(evidence: Evidence, model: Model, rms: list[float]) -> np.ndarray | No
     for index, size in enumerate(rms):
         samples = evidence.records.records[index].samples
         noises = size * random.standard_normal((_SIMULATED, samples))
-        runs = player.pushed(model, index, noises)
+        runs = run_parallel(partial(player.disturbed, model, index, None), list(noises))
         if not all(np.isfinite(run[0]).all() for run in (*runs, smooth[index])):
             return None
         lines = evidence.lines_of(smooth[index], index)

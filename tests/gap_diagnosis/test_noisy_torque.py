@@ -1,0 +1,95 @@
+"""A recorded torque whose sensor adds noise drives the model: that noise is told from causes."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from controller_node import pd_filtered
+from fjr_interface.experiment import RecordDescription
+from fjr_records.records import Record, RecordSet
+from fjr_sim_node import effects, plant
+from fjr_sim_node.simulation import closed_loop
+from gap_diagnosis.any_record import investigate
+from gap_diagnosis.fits.cell_fits import CellFitter
+from gap_diagnosis.model.evidence import Evidence
+from gap_diagnosis.which.noisy_torque import most_noise, torque_noise
+
+RATE = 200.0
+SAMPLES = 4000
+NOMINAL = {name: float(value) for name, value in plant.PLANT.defaults().items()}
+COGGING = {"cogging.amplitude_nm": 3.0, "cogging.cycles_per_turn": 40.0}
+
+
+def runs(share: float, causes: dict[str, float] | None = None) -> RecordSet:
+    """Return runs of unknown loops, with noise of a share of the torque's rms added to it."""
+    made = []
+    law = pd_filtered.coefficients(pd_filtered.CONTROLLER.check({"sample_rate_hz": RATE}))
+    for number in range(4):
+        rng = np.random.default_rng(number)
+        lines = np.fft.rfftfreq(SAMPLES, 1.0 / RATE)
+        band = (lines > 0.5) & (lines < 40.0)
+        spectrum = np.where(band, np.exp(2j * np.pi * rng.uniform(size=lines.size)), 0.0)
+        signal = np.fft.irfft(spectrum, SAMPLES)
+        r = 0.03 * signal / signal.std() * np.minimum(1.0, np.arange(SAMPLES) / (0.5 * RATE))
+        e = effects.coefficients(causes) if causes else None
+        run = closed_loop.simulate(r, RATE, plant.coefficients(NOMINAL), law, None, e)
+        torque = run.torque + share * np.std(run.torque) * rng.standard_normal(SAMPLES)
+        described = RecordDescription.of(
+            "test", sample_rate_hz=RATE, level=0, levels=1, realization=number, realizations=4
+        )
+        position = run.position + 1e-6 * rng.standard_normal(SAMPLES)
+        made.append(Record(f"run_{number}", described, None, torque, position, None))
+    return RecordSet("test", RATE, tuple(made))
+
+
+@given(st.integers(0, 1000), st.floats(0.01, 3.0))
+def test_noise_is_seen_where_the_torque_holds_nothing_else(seed, rms):
+    rng = np.random.default_rng(seed)
+    sine = 5.0 * np.sin(2.0 * np.pi * 0.01 * np.arange(8000))
+    assert most_noise(sine + rms * rng.standard_normal(8000)) == pytest.approx(rms, rel=0.1)
+
+
+def test_noise_of_the_torque_is_no_gap():
+    found = investigate(runs(0.05), NOMINAL).diagnosis
+    assert found.verdict == "no_gap"
+    (said,) = (
+        re.search(r"noise of (.*)% of its rms that did not", n) for n in found.notes if "rms" in n
+    )
+    assert said is not None
+    assert float(said[1]) == pytest.approx(5.0, rel=0.1)
+    inertia = found.parameters["jm"]
+    assert inertia.low < NOMINAL["jm"] < inertia.high
+
+
+def test_a_cause_is_named_with_its_size_beside_noise_of_the_torque():
+    found = investigate(runs(0.02, COGGING), NOMINAL, effects=["cogging", "gravity"]).diagnosis
+    assert found.effects == ["cogging"]
+    assert found.verdict in ("effect", "ambiguous")
+    size = found.parameters["cogging.amplitude_nm"]
+    assert size.low < COGGING["cogging.amplitude_nm"] < size.high
+
+
+def test_noise_that_the_rig_felt_counts_as_none():
+    """A controller answers the noise of its encoder, and the rig feels that."""
+    records = runs(0.0)
+    fitter = CellFitter(Evidence(records, NOMINAL), NOMINAL, 0.1)
+    assert most_noise(records.records[0].torque) > 1.0
+    assert torque_noise(fitter.evidence, fitter.refit().model) is None
+
+
+def test_a_torque_that_is_white_itself_is_no_noise():
+    """A flat torque that excites the rig would hide what a gain of it, or a ripple, leaves."""
+    rng = np.random.default_rng(0)
+    records = runs(0.0)
+    white = tuple(
+        replace(r, torque=float(np.std(r.torque)) * rng.standard_normal(r.samples))
+        for r in records.records
+    )
+    fitter = CellFitter(Evidence(replace(records, records=white), NOMINAL), NOMINAL, 0.1)
+    assert torque_noise(fitter.evidence, fitter.refit().model) is None
