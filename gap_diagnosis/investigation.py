@@ -214,7 +214,7 @@ def investigate_runs(
     diagnosis = judge(fitter, model, found, tested, alternatives, bags, scatter, notes)
     rivals = tuple(fit for fits in tied.values() for fit in fits)
     if unfelt is not None:
-        diagnosis = with_its_bias(diagnosis, fitter, found.best, unfelt)
+        diagnosis = with_its_bias(diagnosis, nominal, fitter, found.best, unfelt)
     chosen_of = {"contenders": contenders(fitter, found, rivals)}
     diagnosis = diagnosis.model_copy(update=chosen_of)
     if order.effects is None or ROUNDING in order.effects:

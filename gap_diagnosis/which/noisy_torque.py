@@ -10,6 +10,7 @@ in which there is the least for it say how strong the noise may be.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -62,10 +63,11 @@ class TorqueNoise:
         """What a reader must know of it."""
         return (
             f"The recorded torque, which drives the model, holds noise of {self.share:.1%} of its "
-            "rms that did not move the rig: errors are as such noise makes them, alike as torques "
-            "in all bands, and no stronger than what the torque holds where it holds least. It "
-            "counts as noise. What is driven by it seems more sluggish than it is, and the "
-            "intervals reach to where sizes would be without it."
+            "rms that did not move the rig, or torques as random moved it that are not recorded: "
+            "errors are as such noise makes them, alike as torques in all bands, and no stronger "
+            "than what the torque holds where it holds least. It counts as noise. What is driven "
+            "by it seems more sluggish than it is, and the intervals reach to where sizes would be "
+            "without it."
         )
 
     def beside(self, records: RecordSet, seed: int) -> RecordSet:
@@ -110,7 +112,11 @@ def beside_torque_noise(
 
 
 def with_its_bias(
-    diagnosis: Diagnosis, fitter: CellFitter, fit: CellFit, noise: TorqueNoise
+    diagnosis: Diagnosis,
+    nominal: Mapping[str, float],
+    fitter: CellFitter,
+    fit: CellFit,
+    noise: TorqueNoise,
 ) -> Diagnosis:
     """Return a diagnosis whose intervals reach to where sizes would be without the noise.
 
@@ -119,6 +125,7 @@ def with_its_bias(
 
     Args:
         diagnosis: of the fit.
+        nominal: datasheet values by the names of PLANT.
         fitter: that made the fit, beside the noise.
         fit: the best one.
         noise: of the torque.
@@ -128,7 +135,7 @@ def with_its_bias(
     moved = np.zeros(fit.solution.x.size)
     for seed in range(_REPEATED):
         records = noise.beside(evidence.records, seed)
-        again = Evidence(records, fitter.nominal)
+        again = Evidence(records, nominal)
         twice = CellFitter(again.played_by(again.player, power), fitter.nominal, fitter.tolerance)
         moved += (twice.taken_over(fit).solution.x - fit.solution.x) / _REPEATED
     space = fit.space
