@@ -5,7 +5,8 @@ size cannot be told from the torque alone: a rig does feel what a controller mak
 its encoder. But noise that the rig did not feel leaves errors which are, as torques, alike at all
 frequencies, and no stronger than what the torque holds where it holds least. What friction, a
 spring or an inertia leaves is strong in some bands and weak in others. So the errors of the band
-in which there is the least for it say how strong the noise may be.
+in which there is the least for it say how strong the noise may be; where it explains most of what
+is left in all bands, it counts.
 """
 
 from __future__ import annotations
@@ -39,6 +40,8 @@ _MOST = 0.1
 """Of the squared torque: where it holds more in all octaves, that is what excites the rig."""
 _FEWEST_ERRORS = 60
 """Of a cell, and noise that is more than the position's there: what else shows no noise."""
+_NEAR = 4.0
+"""Misfit beside the noise above which more than noise is left: that hides how strong noise is."""
 _SIMULATED = 4  # simulations of each run with noise of its torque
 _SEED = 1
 _REPEATED = 2  # fits with as much noise again
@@ -91,7 +94,8 @@ def beside_torque_noise(
         progress: told that the noise is simulated.
 
     Returns:
-        the fitter, the fits, and the noise; what was given, and None, where none is seen.
+        the fitter, the fits, and the noise; what was given, and None, where it is not most of what
+        is left.
     """
     evidence = fitter.evidence
     if not _driven(evidence) or fitter.left_in_a_band(found.best) < NOTHING_LEFT:
@@ -103,6 +107,8 @@ def beside_torque_noise(
     power = evidence.noise_power + noise.power
     beside = evidence.played_by(evidence.player, power)
     other = CellFitter(beside, fitter.nominal, fitter.tolerance)
+    if other.misfit(_judged_anew(other, found.best)) >= _NEAR:
+        return fitter, found, None
     steps = [other.refit(), *(other.taken_over(fit) for fit in found.steps[1:])]
     rivals = {
         count: [_judged_anew(other, fit) for fit in fits] for count, fits in found.rivals.items()
