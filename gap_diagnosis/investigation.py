@@ -44,6 +44,7 @@ from .verdict.tested_causes import Tested
 from .which.equivalents import founded, partners
 from .which.exchange import with_the_better_one
 from .which.found import Found
+from .which.late_torque import brought_to_its_time, is_late
 from .which.noisy_torque import beside_torque_noise, with_its_bias
 from .which.rounding import beside_rounding
 from .which.stepwise import Stepwise
@@ -57,6 +58,8 @@ ASSUMED = (
 _HOPELESS = 5.0
 """Times the motion: where the refit misses more, nothing is searched, for no effect mends that but
 friction where the datasheet has none at all, so that a torque drives the axis away."""
+_SEARCHES = 2
+"""With a torque that comes late and was brought forward: the first may mistake by how much."""
 _SEARCH_SHARE = 0.6
 """Of the budget for the search; the tests of what it found take about as long as one more step."""
 
@@ -186,11 +189,18 @@ def investigate_runs(
         timing = other
         progress(f"search with a torque that is {'' if timing.held else 'not '}held")
         found = _searched(timing, names, progress, until)
+    for _ in range(_SEARCHES):
+        early = brought_to_its_time(timing, found.best, progress)
+        if early is None or time.monotonic() > until:
+            break
+        timing = early
+        found = _searched(timing, names, progress, until)
     fitter = timing.fitter
     if found.best.effects:
         fitter, found = beside_rounding(fitter, found, progress)
     fitter, found, unfelt = beside_torque_noise(fitter, found, progress)
     evidence, heard = fitter.evidence, [*timing.notes]
+    heard += [is_late(timing.late_s)] if timing.late_s else []
     progress("scatter from run to run")
     bags, scatter, said = _run_scatter(fitter, found.best)
     heard += said
@@ -214,7 +224,7 @@ def investigate_runs(
     diagnosis = judge(fitter, model, found, tested, alternatives, bags, scatter, notes)
     rivals = tuple(fit for fits in tied.values() for fit in fits)
     if unfelt is not None:
-        diagnosis = with_its_bias(diagnosis, nominal, fitter, found.best, unfelt)
+        diagnosis = with_its_bias(diagnosis, fitter, found.best, unfelt)
     chosen_of = {"contenders": contenders(fitter, found, rivals)}
     diagnosis = diagnosis.model_copy(update=chosen_of)
     if order.effects is None or ROUNDING in order.effects:

@@ -11,7 +11,6 @@ is left in all bands, it counts.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -118,11 +117,7 @@ def beside_torque_noise(
 
 
 def with_its_bias(
-    diagnosis: Diagnosis,
-    nominal: Mapping[str, float],
-    fitter: CellFitter,
-    fit: CellFit,
-    noise: TorqueNoise,
+    diagnosis: Diagnosis, fitter: CellFitter, fit: CellFit, noise: TorqueNoise
 ) -> Diagnosis:
     """Return a diagnosis whose intervals reach to where sizes would be without the noise.
 
@@ -131,7 +126,6 @@ def with_its_bias(
 
     Args:
         diagnosis: of the fit.
-        nominal: datasheet values by the names of PLANT.
         fitter: that made the fit, beside the noise.
         fit: the best one.
         noise: of the torque.
@@ -141,7 +135,7 @@ def with_its_bias(
     moved = np.zeros(fit.solution.x.size)
     for seed in range(_REPEATED):
         records = noise.beside(evidence.records, seed)
-        again = Evidence(records, nominal)
+        again = Evidence(records, Model(fitter.nominal, {}).whole_plant)
         twice = CellFitter(again.played_by(again.player, power), fitter.nominal, fitter.tolerance)
         moved += (twice.taken_over(fit).solution.x - fit.solution.x) / _REPEATED
     space = fit.space
