@@ -29,6 +29,7 @@ from ..model.steady_runs import SteadyRuns
 from ..outcome.diagnosis import Diagnosis
 from ..outcome.gap_size import Estimate
 from .found import Found
+from .rounding import in_few_counts
 
 _OCTAVES = 6
 _HIGHEST = 0.8
@@ -166,9 +167,12 @@ def _judged_anew(fitter: CellFitter, fit: CellFit) -> CellFit:
 def _driven(evidence: Evidence) -> bool:
     """Tell whether the recorded torque drives the model in all runs, and nothing shows its noise.
 
-    Mean periods show what scatters between them, of the torque as well.
+    Mean periods show what scatters between them, of the torque as well. What an encoder of coarse
+    steps leaves is not its torque's.
     """
     if evidence.slow or evidence.records.swings_free or not evidence.noise.known:
+        return False
+    if in_few_counts(evidence):
         return False
     steady = isinstance(evidence.records, SteadyRuns)
     return not steady and not any(evidence.player.loop.laws)

@@ -75,7 +75,7 @@ def beside_rounding(
         progress: told that rounding is simulated.
     """
     chosen = fitter, found
-    if not in_few_counts(fitter.evidence):
+    if not in_few_counts(fitter.evidence) or not _can_be_played(fitter.evidence):
         return chosen
     yardstick = fitter.weights.select_floor  # of all rounds: noise that grows is not nearer
     least = np.sum(_squares(fitter, found.best) / yardstick)
@@ -108,17 +108,22 @@ def _fitted_anew(fitter: CellFitter, found: Found, rounded: Rounded) -> tuple[Ce
 
 
 def in_few_counts(evidence: Evidence) -> bool:
-    """Tell whether a motion in a known loop is of so few counts that its rounding is not white.
+    """Tell whether a motion is of so few counts that its rounding is not white.
 
-    Only where rounding is more than the noise, and counts lie where those of the simulator do.
+    Only where rounding is more than the noise.
     """
-    if evidence.slow or not evidence.noise.rounds or None in evidence.player.loop.laws:
+    if evidence.slow or not evidence.noise.rounds:
         return False
     positions = [record.position for record in evidence.records.records]
+    return min(float(np.std(p)) for p in positions) < _FEW_COUNTS * step_of(evidence)
+
+
+def _can_be_played(evidence: Evidence) -> bool:
+    """Tell whether the loop is known, and counts lie where those of the simulator do."""
     step = step_of(evidence)
-    counts = np.array([position[0] for position in positions]) / step
+    counts = np.array([record.position[0] for record in evidence.records.records]) / step
     on_grid = float(np.abs(counts - np.rint(counts)).max()) < _OFF_GRID
-    return on_grid and min(float(np.std(p)) for p in positions) < _FEW_COUNTS * step
+    return on_grid and None not in evidence.player.loop.laws
 
 
 def step_of(evidence: Evidence) -> float:

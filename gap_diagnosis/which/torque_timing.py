@@ -33,17 +33,17 @@ class Timing:
         refit: fit of the base parameters alone.
         notes: sentences on it.
         held: whether the torque is held from sample to sample.
-        late_s: by how much it was brought forward, s.
         other: the same with a torque that acts in the other way; None where a loop makes it, or
             that is out of the question.
+        late_s: by how much it was brought forward, s.
     """
 
     fitter: CellFitter
     refit: CellFit
     notes: tuple[str, ...] = ()
     held: bool = True
-    late_s: float = 0.0
     other: Timing | None = None
+    late_s: float = 0.0
 
     def other_if_better(self, best: CellFit) -> Timing | None:
         """Return the other way, if what was found speaks for it.

@@ -4,27 +4,19 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from driven_runs import NOMINAL, driven_runs
 from hypothesis import given
 from hypothesis import strategies as st
 
-from controller_node import pd_filtered
-from fjr_interface.experiment import RecordDescription
-from fjr_records.records import Record, RecordSet
-from fjr_sim_node import effects, plant
-from fjr_sim_node.simulation import closed_loop
 from gap_diagnosis.any_record import investigate
 from gap_diagnosis.fits.cell_fits import CellFitter
 from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.which.noisy_torque import most_noise, torque_noise
 
-RATE = 200.0
-SAMPLES = 4000
-NOMINAL = {name: float(value) for name, value in plant.PLANT.defaults().items()}
 COGGING = {"cogging.amplitude_nm": 3.0, "cogging.cycles_per_turn": 40.0}
 
 
@@ -33,30 +25,9 @@ RIGID = {
 }  # fmt: skip
 
 
-def runs(
-    share: float,
-    causes: dict[str, float] | None = None,
-    rig: Mapping[str, float] = NOMINAL,
-) -> RecordSet:
-    """Return runs of unknown loops, with noise of a share of the torque's rms added to it."""
-    made = []
-    law = pd_filtered.coefficients(pd_filtered.CONTROLLER.check({"sample_rate_hz": RATE}))
-    for number in range(4):
-        rng = np.random.default_rng(number)
-        lines = np.fft.rfftfreq(SAMPLES, 1.0 / RATE)
-        band = (lines > 0.5) & (lines < 40.0)
-        spectrum = np.where(band, np.exp(2j * np.pi * rng.uniform(size=lines.size)), 0.0)
-        signal = np.fft.irfft(spectrum, SAMPLES)
-        r = 0.03 * signal / signal.std() * np.minimum(1.0, np.arange(SAMPLES) / (0.5 * RATE))
-        e = effects.coefficients(causes) if causes else None
-        run = closed_loop.simulate(r, RATE, plant.coefficients(rig), law, None, e)
-        torque = run.torque + share * np.std(run.torque) * rng.standard_normal(SAMPLES)
-        described = RecordDescription.of(
-            "test", sample_rate_hz=RATE, level=0, levels=1, realization=number, realizations=4
-        )
-        position = run.position + 1e-6 * rng.standard_normal(SAMPLES)
-        made.append(Record(f"run_{number}", described, None, torque, position, None))
-    return RecordSet("test", RATE, tuple(made))
+def noisy(share: float):
+    """Return a log that adds noise of a share of the torque's rms."""
+    return lambda torque, rng: torque + share * np.std(torque) * rng.standard_normal(torque.size)
 
 
 @given(st.integers(0, 1000), st.floats(0.01, 3.0))
@@ -67,7 +38,7 @@ def test_noise_is_seen_where_the_torque_holds_nothing_else(seed, rms):
 
 
 def test_noise_of_the_torque_is_no_gap():
-    found = investigate(runs(0.05, rig=RIGID), RIGID).diagnosis
+    found = investigate(driven_runs(rig=RIGID, logged=noisy(0.05)), RIGID).diagnosis
     assert found.verdict == "no_gap"
     (said,) = (
         re.search(r"noise of (.*)% of its rms that did not", n) for n in found.notes if "rms" in n
@@ -79,7 +50,9 @@ def test_noise_of_the_torque_is_no_gap():
 
 
 def test_a_cause_is_named_with_its_size_beside_noise_of_the_torque():
-    found = investigate(runs(0.02, COGGING), NOMINAL, effects=["cogging", "gravity"]).diagnosis
+    found = investigate(
+        driven_runs(COGGING, logged=noisy(0.02)), NOMINAL, effects=["cogging", "gravity"]
+    ).diagnosis
     assert found.effects == ["cogging"]
     assert found.verdict in ("effect", "ambiguous")
     size = found.parameters["cogging.amplitude_nm"]
@@ -88,7 +61,7 @@ def test_a_cause_is_named_with_its_size_beside_noise_of_the_torque():
 
 def test_noise_that_the_rig_felt_counts_as_none():
     """A controller answers the noise of its encoder, and the rig feels that."""
-    records = runs(0.0)
+    records = driven_runs()
     fitter = CellFitter(Evidence(records, NOMINAL), NOMINAL, 0.1)
     assert most_noise(records.records[0].torque) > 1.0
     assert torque_noise(fitter.evidence, fitter.refit().model) is None
@@ -97,7 +70,7 @@ def test_noise_that_the_rig_felt_counts_as_none():
 def test_a_torque_that_is_white_itself_is_no_noise():
     """A flat torque that excites the rig would hide what a gain of it, or a ripple, leaves."""
     rng = np.random.default_rng(0)
-    records = runs(0.0)
+    records = driven_runs()
     white = tuple(
         replace(r, torque=float(np.std(r.torque)) * rng.standard_normal(r.samples))
         for r in records.records
