@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 import time
 from collections.abc import Mapping, Sequence
@@ -39,13 +40,13 @@ from .verdict.coarse_encoder import with_coarse_encoder
 from .verdict.contenders import contenders
 from .verdict.judgement import driven_backwards, judge, reproduced
 from .verdict.kept_causes import kept
+from .verdict.noisy_torque import beside_the_noise, unfelt_noise
 from .verdict.notes import of_fit, of_records, yielding
 from .verdict.tested_causes import Tested
 from .which.equivalents import founded, partners
 from .which.exchange import with_the_better_one
 from .which.found import Found
 from .which.late_torque import brought_to_its_time, is_late
-from .which.noisy_torque import beside_torque_noise, with_its_bias
 from .which.rounding import beside_rounding
 from .which.stepwise import Stepwise
 from .which.torque_timing import Timing, timed
@@ -198,7 +199,6 @@ def investigate_runs(
     fitter = timing.fitter
     if found.best.effects:
         fitter, found = beside_rounding(fitter, found, progress)
-    fitter, found, unfelt = beside_torque_noise(fitter, found, progress)
     evidence, heard = fitter.evidence, [*timing.notes]
     heard += [is_late(timing.late_s)] if timing.late_s else []
     progress("scatter from run to run")
@@ -221,10 +221,14 @@ def investigate_runs(
     alternatives = {effect: [fit.effects[-1] for fit in fits] for effect, fits in tied.items()}
     progress("judgement")
     notes = [*records.notes, *cut, *heard, *of_records(evidence, nominal), *of_fit(found)]
+    fitted, unfelt = fitter, unfelt_noise(fitter, found.best)
+    if unfelt is not None:
+        fitter, notes = copy.copy(fitter), [*notes, unfelt.note]
+        fitter.evidence = unfelt.counted(evidence)
     diagnosis = judge(fitter, model, found, tested, alternatives, bags, scatter, notes)
     rivals = tuple(fit for fits in tied.values() for fit in fits)
     if unfelt is not None:
-        diagnosis = with_its_bias(diagnosis, fitter, found.best, unfelt)
+        diagnosis = beside_the_noise(diagnosis, fitted, found.best, unfelt)
     chosen_of = {"contenders": contenders(fitter, found, rivals)}
     diagnosis = diagnosis.model_copy(update=chosen_of)
     if order.effects is None or ROUNDING in order.effects:

@@ -8,6 +8,5 @@ rate is seen to act.
 
 What the torque and the encoder are is asked apart: `torque_timing` says first how a recorded torque
 acts between its samples, `late_torque` brings forward one that comes late, `drift_gate` fits a
-drift of friction, `rounding` plays an encoder of coarse steps, and `noisy_torque` finds noise of a
-torque that drives the model.
+drift of friction, and `rounding` plays an encoder of coarse steps.
 """

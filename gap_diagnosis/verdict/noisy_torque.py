@@ -11,25 +11,25 @@ is left in all bands, it counts.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 from scipy.signal import welch
 
-from fjr_kit.telling import Progress
 from fjr_records.records import RecordSet
 
 from ..fits.cell_fits import CellFitter
 from ..fits.comparison import NOTHING_LEFT, CellFit
+from ..how_far.ledger import Ledger
 from ..model.evidence import Evidence
 from ..model.rig_model import Model
 from ..model.simulated_rig import run_parallel
 from ..model.steady_runs import SteadyRuns
 from ..outcome.diagnosis import Diagnosis
 from ..outcome.gap_size import Estimate
-from .found import Found
-from .rounding import in_few_counts
+from ..which.rounding import in_few_counts
 
 _OCTAVES = 6
 _HIGHEST = 0.8
@@ -42,6 +42,8 @@ _FEWEST_ERRORS = 60
 """Of a cell, and noise that is more than the position's there: what else shows no noise."""
 _NEAR = 4.0
 """Misfit beside the noise above which more than noise is left: that hides how strong noise is."""
+_NOT_NEEDED = 0.75
+"""How sure a cause is, of what it was, where noise explains what is left without any."""
 _SIMULATED = 4  # simulations of each run with noise of its torque
 _SEED = 1
 _REPEATED = 2  # fits with as much noise again
@@ -73,6 +75,10 @@ class TorqueNoise:
             "without it."
         )
 
+    def counted(self, evidence: Evidence) -> Evidence:
+        """Return the evidence to whose noise it is added."""
+        return evidence.played_by(evidence.player, evidence.noise_power + self.power)
+
     def beside(self, records: RecordSet, seed: int) -> RecordSet:
         """Return the records with as much noise of the torque again."""
         random = np.random.default_rng(seed)
@@ -83,71 +89,65 @@ class TorqueNoise:
         return replace(records, records=tuple(noisy))
 
 
-def beside_torque_noise(
-    fitter: CellFitter, found: Found, progress: Progress = lambda _: None
-) -> tuple[CellFitter, Found, TorqueNoise | None]:
-    """Return what fits beside noise of the torque, and its fits, if there is any that is seen.
+def unfelt_noise(fitter: CellFitter, best: CellFit) -> TorqueNoise | None:
+    """Return the noise of the torque that a fit shows; None where it is not most of the rest.
+
+    Fits are not weighed by it: it is alike on all lines, of which the highest bands hold most, and
+    these are where a model of a driven rig is least exact.
 
     Args:
-        fitter: of the fits.
-        found: the refit of the base parameters, and perhaps causes.
-        progress: told that the noise is simulated.
-
-    Returns:
-        the fitter, the fits, and the noise; what was given, and None, where it is not most of what
-        is left.
+        fitter: that made the fit.
+        best: the refit of the base parameters, or that with all causes.
     """
     evidence = fitter.evidence
-    if not _driven(evidence) or fitter.left_in_a_band(found.best) < NOTHING_LEFT:
-        return fitter, found, None
-    progress("noise of the torque")
-    noise = torque_noise(evidence, found.best.model)
+    if not _driven(evidence) or fitter.left_in_a_band(best) < NOTHING_LEFT:
+        return None
+    noise = torque_noise(evidence, best.model)
     if noise is None:
-        return fitter, found, None
-    power = evidence.noise_power + noise.power
-    beside = evidence.played_by(evidence.player, power)
-    other = CellFitter(beside, fitter.nominal, fitter.tolerance)
-    if other.misfit(_judged_anew(other, found.best)) >= _NEAR:
-        return fitter, found, None
-    steps = [other.refit(), *(other.taken_over(fit) for fit in found.steps[1:])]
-    rivals = {
-        count: [_judged_anew(other, fit) for fit in fits] for count, fits in found.rivals.items()
-    }
-    notes = (*found.notes, noise.note)
-    return other, replace(found, steps=steps, rivals=rivals, notes=notes), noise
+        return None
+    left = Ledger(noise.counted(evidence), fitter.select_parts).step(best.model, None, "refit")
+    return noise if (left.chi2_per_dof or math.inf) < _NEAR else None
 
 
-def with_its_bias(
+def beside_the_noise(
     diagnosis: Diagnosis, fitter: CellFitter, fit: CellFit, noise: TorqueNoise
 ) -> Diagnosis:
     """Return a diagnosis whose intervals reach to where sizes would be without the noise.
 
-    Noise of what drives a model biases its fit (errors in variables). As much noise again moves the
-    fit by as much again, to first order (simulation extrapolation: Cook, Stefanski 1994, JASA 89).
+    Where noise explains what the refit leaves, no cause is needed, and each is less sure. Noise of
+    what drives a model biases its fit (errors in variables). As much noise again moves the fit by
+    as much again, to first order (simulation extrapolation: Cook, Stefanski 1994, JASA 89).
 
     Args:
         diagnosis: of the fit.
-        fitter: that made the fit, beside the noise.
+        fitter: that made the fit.
         fit: the best one.
         noise: of the torque.
     """
-    evidence = fitter.evidence
-    power = evidence.noise_power + noise.power
     moved = np.zeros(fit.solution.x.size)
     for seed in range(_REPEATED):
-        records = noise.beside(evidence.records, seed)
+        records = noise.beside(fitter.evidence.records, seed)
         again = Evidence(records, Model(fitter.nominal, {}).whole_plant)
-        twice = CellFitter(again.played_by(again.player, power), fitter.nominal, fitter.tolerance)
+        twice = CellFitter(again, fitter.nominal, fitter.tolerance)
         moved += (twice.taken_over(fit).solution.x - fit.solution.x) / _REPEATED
     space = fit.space
     without = space.model(np.clip(fit.solution.x - moved, *space.bounds()))
     values = {**without.plant, **without.effects}
     parameters = {n: _reaching(e, values.get(n)) for n, e in diagnosis.parameters.items()}
+    left = diagnosis.steps[1].chi2_per_dof
+    sure = _NOT_NEEDED if left is not None and left < NOTHING_LEFT else 1.0
     causes = [
-        cause.model_copy(update={"parameters": {n: parameters[n] for n in cause.parameters}})
+        cause.model_copy(
+            update={
+                "present": sure * cause.present,
+                "parameters": {n: parameters[n] for n in cause.parameters},
+            }
+        )
         for cause in diagnosis.causes
     ]
-    return diagnosis.model_copy(update={"parameters": parameters, "causes": causes})
+    confidence = min((c.present for c in causes), default=diagnosis.confidence)
+    changes = {"parameters": parameters, "causes": causes, "confidence": confidence}
+    return diagnosis.model_copy(update=changes)
 
 
 def _reaching(found: Estimate, without: float | None) -> Estimate:
@@ -158,10 +158,6 @@ def _reaching(found: Estimate, without: float | None) -> Estimate:
     return found.model_copy(
         update={"low": found.low + min(by, 0.0), "high": found.high + max(by, 0.0)}
     )
-
-
-def _judged_anew(fitter: CellFitter, fit: CellFit) -> CellFit:
-    return replace(fit, left=fitter.left_by(fit.model, fit.variance))
 
 
 def _driven(evidence: Evidence) -> bool:
