@@ -41,10 +41,10 @@ help: ## show the targets
 demo: $(INSTALLED) ## install everything, run a campaign on the ROS graph, write its report
 	@$(BIN)/fjr demo
 
-# Three workers keep two cores busy: the one that plays graphs waits half of its time.
+# Four workers keep two cores busy: the one that plays graphs waits half of its time, others a little.
 test: $(INSTALLED) ## install everything, run the tests: 15 to 30 minutes on two cores
 	@echo "All tests: 15 to 30 minutes on two cores. make test-quick takes one or two."
-	$(PYTEST) -n 3 --dist loadfile --no-loadscope-reorder
+	$(PYTEST) -n 4 --dist loadfile --no-loadscope-reorder
 
 test-quick: $(INSTALLED) ## run the tests of the cores that take least: one or two minutes
 	@$(PYTEST) -n 2 --dist loadfile -m 'not ros and not slow' $(QUICK)
