@@ -18,7 +18,7 @@ from fjr_records.records import Record, RecordSet
 from .fits.cell_fits import DRIFT, CellFitter
 from .fits.comparison import NOTHING_LEFT, CellFit
 from .fits.estimates import moved_by_scatter, relative_scatter
-from .fits.gains import gain, stands_for
+from .fits.gains import gain
 from .fits.unseen_friction import SCATTER
 from .gates.bag_deviations import GROUPS
 from .gates.bags_gate import as_bags, drift_of_runs, run_changes, scattering
@@ -37,13 +37,12 @@ from .outcome.verdict_words import BACKWARDS, LOST, ROUNDING
 from .starts.catalogue import catalogue
 from .starts.search_space import TOLERANCE
 from .verdict.coarse_encoder import with_coarse_encoder
-from .verdict.contenders import contenders
+from .verdict.contenders import contenders, tied_fits
 from .verdict.judgement import driven_backwards, judge, reproduced
 from .verdict.kept_causes import kept
 from .verdict.noisy_torque import beside_the_noise, unfelt_noise
 from .verdict.notes import of_fit, of_records, yielding
 from .verdict.tested_causes import Tested
-from .which.equivalents import founded, partners
 from .which.exchange import with_the_better_one
 from .which.found import Found
 from .which.late_torque import brought_to_its_time, is_late
@@ -206,12 +205,12 @@ def investigate_runs(
     heard += said
     found, tested = kept(fitter, found, scatter, progress, names, until)
     progress("what may stand in for a cause")
-    tied = _rivals(fitter, found, tested, names)
+    tied = tied_fits(fitter, found, tested, names)
     if (anew := with_the_better_one(found, tied, fitter)) and time.monotonic() < until:
         progress(f"search with {anew.best.effects[-1]}")
         anew = _stepwise(fitter, names, progress, until).go_on(anew)
         found, tested = kept(fitter, anew, scatter, progress, names, until)
-        tied = _rivals(fitter, found, tested, names)
+        tied = tied_fits(fitter, found, tested, names)
     backwards = driven_backwards(evidence)
     lost = reproduced(fitter, found.best) < LEAST_PRESENT
     if backwards or ((tested or not names) and lost):
@@ -294,37 +293,3 @@ def _run_scatter(
     drift = "" if isinstance(evidence.records, SteadyRuns) else drift_of_runs(bags)
     said = [sentence for sentence in (scattering(bags), drift) if sentence]
     return bags, relative_scatter(bags), said
-
-
-def _rivals(
-    fitter: CellFitter, found: Found, tested: Sequence[Tested], names: Sequence[str]
-) -> dict[str, list[CellFit]]:
-    """Return, for each cause, fits in which another effect does as well in its place."""
-    return {t.effect: _tied(fitter, found, t, names) for t in tested}
-
-
-def _tied(fitter: CellFitter, found: Found, tested: Tested, names: Sequence[str]) -> list[CellFit]:
-    """Return fits in which an effect does as well in place of a cause, all else fitted anew.
-
-    A near equivalent is in the set unless unseen parts tell it from the cause as surely as they
-    must show a cause at all.
-    """
-    best = found.best
-    near = {*partners([tested.effect], set(names), fitter.nominal)}
-    others = sorted({*near, *found.alternatives.get(tested.effect, ())} - set(best.effects))
-    tied, beside = [], tested.without.effects
-    searched = {fit.effects: fit for fits in found.rivals.values() for fit in fits}
-    for effect in founded(others, beside, fitter.nominal, names):
-        other = searched.get((*beside, effect))
-        if other is None:
-            proposals = fitter.screening(tested.without, effect).proposals()
-            other = fitter.add(tested.without, effect, proposals) if proposals else None
-        if other is None:
-            continue
-        as_well = partial(
-            stands_for, fitter, best=best, first=tested.gain.mean, near=effect in near
-        )
-        further = other
-        if as_well(other) or as_well(further := fitter.further(other)):
-            tied.append(further)
-    return tied

@@ -6,12 +6,56 @@ All are compared on the data that select, which are not those that report.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 from ..fits.cell_fits import CellFitter
 from ..fits.comparison import CellFit
-from ..fits.gains import Gain, gain
+from ..fits.gains import Gain, gain, stands_for
 from ..outcome.contender import Contender
+from ..which.equivalents import founded, partners
 from ..which.found import Found
+from .tested_causes import Tested
+
+
+def tied_fits(
+    fitter: CellFitter, found: Found, tested: Sequence[Tested], names: Sequence[str]
+) -> dict[str, list[CellFit]]:
+    """Return, for each cause, fits in which another effect does as well in its place.
+
+    Args:
+        fitter: that made all fits.
+        found: the steps of the search.
+        tested: the causes that are kept.
+        names: identifiers of what may be named.
+    """
+    return {t.effect: _tied(fitter, found, t, names) for t in tested}
+
+
+def _tied(fitter: CellFitter, found: Found, tested: Tested, names: Sequence[str]) -> list[CellFit]:
+    """Return fits in which an effect does as well in place of a cause, all else fitted anew.
+
+    A near equivalent is in the set unless unseen parts tell it from the cause as surely as they
+    must show a cause at all.
+    """
+    best = found.best
+    near = {*partners([tested.effect], set(names), fitter.nominal)}
+    others = sorted({*near, *found.alternatives.get(tested.effect, ())} - set(best.effects))
+    tied, beside = [], tested.without.effects
+    searched = {fit.effects: fit for fits in found.rivals.values() for fit in fits}
+    for effect in founded(others, beside, fitter.nominal, names):
+        other = searched.get((*beside, effect))
+        if other is None:
+            proposals = fitter.screening(tested.without, effect).proposals()
+            other = fitter.add(tested.without, effect, proposals) if proposals else None
+        if other is None:
+            continue
+        as_well = partial(
+            stands_for, fitter, best=best, first=tested.gain.mean, near=effect in near
+        )
+        further = other
+        if as_well(other) or as_well(further := fitter.further(other)):
+            tied.append(further)
+    return tied
 
 
 def contenders(fitter: CellFitter, found: Found, tied: Sequence[CellFit]) -> list[Contender]:
