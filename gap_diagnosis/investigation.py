@@ -190,8 +190,10 @@ def investigate_runs(
         progress(f"search with a torque that is {'' if timing.held else 'not '}held")
         found = _searched(timing, names, progress, until)
     for _ in range(_SEARCHES):
+        if time.monotonic() > until:
+            break
         early = brought_to_its_time(timing, found.best, progress)
-        if early is None or time.monotonic() > until:
+        if early is None:
             break
         timing = early
         found = _searched(timing, names, progress, until)

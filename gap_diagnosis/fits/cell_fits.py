@@ -12,6 +12,7 @@ from functools import partial
 
 import numpy as np
 
+from fjr_records.records import RecordSet
 from fjr_sim_node import effects as fx
 
 from ..model.evidence import Evidence
@@ -46,6 +47,11 @@ class CellFitter(ReweightedFits):
         """Prepare."""
         super().__init__(evidence, nominal, tolerance)
         self._rippled: tuple[CellFit, tuple[Ripples, SeenTorques]] | None = None
+
+    def with_runs(self, records: RecordSet) -> CellFitter:
+        """Return what fits other runs by the same datasheet."""
+        evidence = Evidence(records, Model(self.nominal, {}).whole_plant)
+        return CellFitter(evidence, self.nominal, self.tolerance)
 
     def screening(self, parent: CellFit, effect: str) -> Screening:
         """Return what the starts of an effect promise beside a fit."""

@@ -34,10 +34,11 @@ from ..which.rounding import in_few_counts
 _OCTAVES = 6
 _HIGHEST = 0.8
 """Of half the sample rate: above it a filter may have taken the noise away."""
-_FEWEST_LINES = 4
+_FEWEST_NUMBERS = 200
+"""Independent numbers of the torque in an octave: of fewer, chance makes the least too small."""
 _PER_SEGMENT = 1024
 _MOST = 0.1
-"""Of the squared torque: where it holds more in all octaves, that is what excites the rig."""
+"""Of the torque's variance: where it holds more in all octaves, that is what excites the rig."""
 _FEWEST_ERRORS = 60
 """Of a cell, and noise that is more than the position's there: what else shows no noise."""
 _NEAR = 4.0
@@ -55,7 +56,7 @@ class TorqueNoise:
 
     Attributes:
         rms: of the samples of each run, (runs,), N m.
-        share: of all runs together, over the rms of their torque.
+        share: of all runs together, over the rms of their torque about its mean.
         power: mean square of an error that it makes in each cell, (cells,), rad2.
     """
 
@@ -68,10 +69,10 @@ class TorqueNoise:
         """What a reader must know of it."""
         return (
             f"The recorded torque, which drives the model, holds noise of {self.share:.1%} of its "
-            "rms that did not move the rig, or torques as random moved it that are not recorded: "
-            "errors are as such noise makes them, alike as torques in all bands, and no stronger "
-            "than what the torque holds where it holds least. It counts as noise. What is driven "
-            "by it seems more sluggish than it is, and the intervals reach to where sizes would be "
+            "rms about the mean that did not move the rig, or torques as random moved it that are "
+            "not recorded: errors are as such noise makes them, alike as torques in all bands, and "
+            "no stronger than what the torque holds where it holds least. It counts as noise. What "
+            "is driven by it seems more sluggish than it is, and the intervals reach to where sizes would be "
             "without it."
         )
 
@@ -127,9 +128,8 @@ def beside_the_noise(
     moved = np.zeros(fit.solution.x.size)
     for seed in range(_REPEATED):
         records = noise.beside(fitter.evidence.records, seed)
-        again = Evidence(records, Model(fitter.nominal, {}).whole_plant)
-        twice = CellFitter(again, fitter.nominal, fitter.tolerance)
-        moved += (twice.taken_over(fit).solution.x - fit.solution.x) / _REPEATED
+        twice = fitter.with_runs(records).taken_over(fit)
+        moved += (twice.solution.x - fit.solution.x) / _REPEATED
     space = fit.space
     without = space.model(np.clip(fit.solution.x - moved, *space.bounds()))
     values = {**without.plant, **without.effects}
@@ -182,7 +182,7 @@ def torque_noise(evidence: Evidence, model: Model) -> TorqueNoise | None:
         model: the best one.
     """
     torques = [record.torque for record in evidence.records.records]
-    powers = [float(np.mean(torque**2)) for torque in torques]
+    powers = [float(np.var(torque)) for torque in torques]
     most = [most_noise(torque) for torque in torques]
     if np.sum(np.square(most)) > _MOST * np.sum(powers):
         return None
@@ -218,7 +218,7 @@ def most_noise(torque: np.ndarray) -> float:
     for octave in range(_OCTAVES):
         high = _HIGHEST / 2**octave
         inside = density[(frequency > high / 2.0) & (frequency <= high)]
-        if inside.size >= _FEWEST_LINES:
+        if inside.size and 0.25 * high * torque.size >= _FEWEST_NUMBERS:
             found.append(float(np.mean(inside)))
     return float(np.sqrt(min(found) / 2.0)) if found else 0.0
 

@@ -15,8 +15,6 @@ from ..fits.cell_fits import DRIFT, CellFitter
 from ..fits.comparison import CellFit
 from ..fits.gains import MOST_P, Gain, closed, gain
 from ..gates.gate_checks import Gate
-from ..model.evidence import Evidence
-from ..model.rig_model import Model
 from .stepwise import LEAST_CLOSED
 
 _NAME = f"{DRIFT}.friction_per_s"
@@ -31,7 +29,7 @@ def drift_gate(fitter: CellFitter, refit: CellFit) -> Gate:
         fitter: of the runs.
         refit: fit of the base parameters alone.
     """
-    anew = _with_runs(fitter, _anew(fitter.evidence.records))
+    anew = fitter.with_runs(_anew(fitter.evidence.records))
     tried = [_drift(fitter, refit), _drift(anew, anew.refit())]
     found, change = max(tried, key=lambda one: one[0].mean)
     drifts = found.present and change != 0.0
@@ -59,11 +57,6 @@ def _drift(fitter: CellFitter, refit: CellFit) -> tuple[Gain, float]:
     if fit is None or closed(fitter, fit, refit) < LEAST_CLOSED:
         return Gain(0.0, 0.0, 0.0, 1.0), 0.0
     return gain(fitter, fit, refit), 100.0 * fit.model.effects[_NAME]
-
-
-def _with_runs(fitter: CellFitter, records: RecordSet) -> CellFitter:
-    evidence = Evidence(records, Model(fitter.nominal, {}).whole_plant)
-    return CellFitter(evidence, fitter.nominal, fitter.tolerance)
 
 
 def _anew(records: RecordSet) -> RecordSet:

@@ -16,11 +16,10 @@ from scipy.interpolate import CubicSpline
 from fjr_kit.telling import Progress
 from fjr_records.records import RecordSet
 
-from ..fits.cell_fits import CellFitter
 from ..fits.comparison import CellFit
 from ..fits.gains import gain
 from ..model.evidence import Evidence
-from ..model.rig_model import Model
+from ..model.steady_runs import SteadyRuns
 from .torque_timing import Timing
 
 _LATEST_S = 0.1
@@ -31,21 +30,26 @@ _SETTLED = 0.1  # of a sample, or of what it is late
 _LATE = ("delay", "actuator_lag")
 
 
-def brought_forward(torque: np.ndarray, samples: float) -> np.ndarray:
-    """Return a signal as much earlier; at the end it stays as it was last.
+def brought_forward(torque: np.ndarray, samples: float, period: int = 1) -> np.ndarray:
+    """Return a signal as much earlier; at the end it goes on with its last period.
 
     Args:
         torque: float64 (samples,).
         samples: by how many, not necessarily a whole number.
+        period: its last samples, which repeat; the last one alone if it has no period.
     """
-    at = np.minimum(np.arange(torque.size) + samples, torque.size - 1.0)
-    return CubicSpline(np.arange(torque.size), torque)(at)
+    ahead = np.resize(torque[-period:], int(np.ceil(samples)) + 1)
+    longer = np.concatenate([torque, ahead])
+    return CubicSpline(np.arange(longer.size), longer)(np.arange(torque.size) + samples)
 
 
 def with_early_torque(records: RecordSet, late_s: float) -> RecordSet:
     """Return records whose torque is that much earlier."""
     samples = late_s * records.sample_rate_hz
-    moved = (replace(r, torque=brought_forward(r.torque, samples)) for r in records.records)
+    moved = []
+    for record in records.records:
+        period = record.samples - records.run_in if isinstance(records, SteadyRuns) else 1
+        moved.append(replace(record, torque=brought_forward(record.torque, samples, period)))
     return replace(records, records=tuple(moved))
 
 
@@ -74,7 +78,7 @@ def brought_to_its_time(timing: Timing, best: CellFit, progress: Progress) -> Ti
             break
         progress("torque brought forward")
         late += further
-        fitter = _moved(timing, late)
+        fitter = first.with_runs(with_early_torque(evidence.records, late))
         fit = fitter.taken_over(fit)
         if abs(further) < _SETTLED * max(1.0 / rate, late):
             break
@@ -92,13 +96,6 @@ def is_late(late_s: float) -> str:
         "does, or one that is read after the encoder: the rig moved as much earlier than this "
         "torque would have moved it. It was brought forward by that time."
     )
-
-
-def _moved(timing: Timing, late_s: float) -> CellFitter:
-    fitter = timing.fitter
-    records = with_early_torque(fitter.evidence.records, late_s)
-    whole = Model(fitter.nominal, {}).whole_plant
-    return CellFitter(Evidence(records, whole), fitter.nominal, fitter.tolerance)
 
 
 def _lateness(evidence: Evidence, fit: CellFit) -> float:

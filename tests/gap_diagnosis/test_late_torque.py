@@ -24,6 +24,13 @@ def test_a_signal_is_as_much_earlier_as_is_asked(cycles, phase, samples):
     assert np.abs(early - np.cos(omega * (k + samples) + phase))[5:-15].max() < 0.02
 
 
+@given(st.integers(1, 20), st.floats(0.0, 6.28), st.floats(0.0, 8.0))
+def test_the_end_of_a_steady_period_goes_on_with_its_begin(cycles, phase, samples):
+    k, omega = np.arange(600), 2.0 * np.pi * cycles / 200.0
+    early = brought_forward(np.cos(omega * k + phase), samples, 200)
+    assert np.abs(early - np.cos(omega * (k + samples) + phase))[5:].max() < 0.02
+
+
 def read_late(torque, _):
     """Return a torque that is logged 9 ms, of ten fine samples to one of the log, too late."""
     return np.concatenate([np.zeros(18), torque[:-18]])
