@@ -71,9 +71,9 @@ class TorqueNoise:
             f"The recorded torque, which drives the model, holds noise of {self.share:.1%} of its "
             "rms about the mean that did not move the rig, or torques as random moved it that are "
             "not recorded: errors are as such noise makes them, alike as torques in all bands, and "
-            "no stronger than what the torque holds where it holds least. It counts as noise. What "
-            "is driven by it seems more sluggish than it is, and the intervals reach to where sizes would be "
-            "without it."
+            "no stronger than what the torque holds where it holds least. It counts as noise. "
+            "What is driven by it seems more sluggish than it is, and the intervals reach to "
+            "where sizes would be without it."
         )
 
     def counted(self, evidence: Evidence) -> Evidence:
