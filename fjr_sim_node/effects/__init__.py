@@ -1,7 +1,7 @@
 """The table of effects that the bare plant lacks: one entry for each, and nothing said elsewhere.
 
 An entry (`entry.Effect`) holds identifier, law, parameters with unit, bounds and source, what the
-effect acts on and depends on, starts of fits, near and exact equivalents, and telltale. Node
+effect acts on and depends on, starts of fits, near and exact equivalents, and `telltale`. Node
 parameters, parameter files, fits, documents and reports all read it. To add an effect, add its
 entry to `friction`, `transmission` or `drive` and write its law (in `plant` or `simulation.rig`),
 where `fx.EFFECT_PARAMETER`, in capitals, is the place of a parameter among the coefficients. What
@@ -27,8 +27,9 @@ from fjr_interface.parameters import nearest
 from fjr_kit.errors import InputError, shown
 
 from .drive import DRIVE, ENCODER
-from .entry import QUANTITIES, AtVelocity, Effect, EffectParameter, Load, Over, Telltale
+from .entry import AtVelocity, Effect, EffectParameter, Load
 from .friction import FRICTION
+from .telltale import QUANTITIES, Over, Telltale
 from .transmission import TRANSMISSION
 
 __all__ = [

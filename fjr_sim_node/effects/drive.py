@@ -12,12 +12,12 @@ from .entry import (
     Effect,
     EffectParameter,
     Load,
-    Telltale,
     angle,
     ripple,
     ripple_starts,
     size,
 )
+from .telltale import Telltale
 
 _SHARES = (0.15, 0.25, 0.4, 0.5, 0.6, 0.7, 0.75, 0.8, 0.85, 0.9, 0.94, 0.97, 1.0, 1.04, 1.1)
 """Torque limits over the greatest commanded torque: which peaks are clipped changes from one to

@@ -12,6 +12,8 @@ import numpy as np
 from fjr_interface.linear_axis import PER_TURN
 from fjr_interface.parameters import Parameter
 
+from .telltale import Telltale
+
 if TYPE_CHECKING:
     from typing_extensions import Self
 
@@ -27,45 +29,6 @@ FromPart = Callable[[Mapping[str, float], Mapping[str, float]], dict[str, float]
 """Takes effect parameters by full name and bare parameters; returns effect parameters."""
 AtVelocity = Callable[[np.ndarray], np.ndarray]
 """Takes velocities (rad/s); returns torques (N m) of a size of one."""
-
-
-Over = Literal[
-    "velocity", "travel", "position", "turn", "deflection", "deflection rate", "load", "command",
-    "command rate", "time", "frequency",
-]  # fmt: skip
-"""The quantity at which a law acts."""
-QUANTITIES: dict[Over, tuple[str, str]] = {
-    "velocity": ("motor velocity", "rad/s"),
-    "travel": ("travel of the motor since it turned round", "rad"),
-    "position": ("motor position", "rad"),
-    "turn": ("motor position within one period", "rad"),
-    "deflection": ("deflection of the transmission", "rad"),
-    "deflection rate": ("rate of the deflection", "rad/s"),
-    "load": ("torque in the gear", "N m"),
-    "command": ("commanded torque", "N m"),
-    "command rate": ("rate of the commanded torque", "N m/s"),
-    "time": ("time since the first run began", "s"),
-    "frequency": ("frequency", "Hz"),
-}
-"""Name and unit of each; frequency is that of what no torque at one of the others shows."""
-Along = Literal["", "velocity", "command", "deflection rate"]
-"""What a law has the direction of, so that both directions are folded into one; empty: nothing."""
-
-
-@dataclass(frozen=True)
-class Telltale:
-    """How an effect shows in the data, and the axis of the plot that shows it.
-
-    Attributes:
-        words: how it shows, in words.
-        over: over what the missing torque is drawn, or, over frequency, the error of the position.
-        along: in which direction that torque counts as positive, and what it is drawn over too, but
-            for an angle, travel and time, which have none.
-    """
-
-    words: str
-    over: Over
-    along: Along = ""
 
 
 CONSTANT_TORQUE = "constant torque"

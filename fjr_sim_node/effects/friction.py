@@ -13,11 +13,11 @@ from .entry import (
     Effect,
     EffectParameter,
     Start,
-    Telltale,
     ripple,
     ripple_starts,
     size,
 )
+from .telltale import Telltale
 
 # A level above Coulomb friction bends the bare parameters so far that small ones promise nothing;
 # a great level that falls within a small velocity would only make the plant stiff.

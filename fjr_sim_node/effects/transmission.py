@@ -11,12 +11,12 @@ from .entry import (
     Effect,
     EffectParameter,
     Load,
-    Telltale,
     angle,
     ripple,
     ripple_starts,
     size,
 )
+from .telltale import Telltale
 
 _MODES = tuple(np.geomspace(0.08, 2.0, 44).tolist())
 """Frequencies of a light third mass over the highest with signal: it shows in a band as narrow as

@@ -18,8 +18,9 @@ from typing import Literal
 import numpy as np
 
 from fjr_records.record_noise import RecordNoise, record_noise
-from fjr_records.records import Record, RecordSet
+from fjr_records.records import RecordSet
 
+from .held_motion import held_lines
 from .lapped import lapped, samples_of
 from .octaves import Octaves, lines_with_signal
 from .parts import Purpose, cut, hop_of, joined, spans_of
@@ -32,7 +33,6 @@ from .twist import twist_of
 _SLIGHT = 0.01  # of the torque: in a slow motion, less of it says nothing
 _SIMULATION = 1e-3  # error of the simulation itself, of its torque or of its motion
 _DIVERGED = 1e6
-_SOFT = 1e-6  # of torque over motion: the gain of a loop that holds next to nothing
 
 
 class Evidence:
@@ -79,12 +79,7 @@ class Evidence:
         self.twist = None if self.slow else twist_of(records, nominal, self.hop, run_in, of_twist)
         self._recorded = [self._beside_twist(m, i) for i, m in enumerate(self._measured)]
         self.octaves = Octaves.of(self.hop, self.lines)
-        frequency = (np.arange(self.lines) + 0.5) * self.line_hz
-        held = [
-            lapped(r.torque, self.hop)[:, : self.lines]
-            / np.maximum(np.abs(self.simulator.response(frequency, i)), _least_held(r))
-            for i, r in enumerate(records.records)
-        ]
+        held = held_lines(records, self.simulator.response, self.hop, self.lines)
         self._held = [self._beside_twist(lines, i) for i, lines in enumerate(held)]
         self.parts = tuple(cut(records, self.hop, run_in))
         own, bands = len(self.octaves), self.octaves.of_line
@@ -317,8 +312,3 @@ class Evidence:
         count = np.bincount(cell, minlength=self.cells)
         total = np.bincount(cell, values**2, self.cells)
         return total / np.maximum(count, 1)
-
-
-def _least_held(record: Record) -> float:
-    """Return the gain of a loop (N m/rad) that holds next to nothing, above zero."""
-    return _SOFT * float(np.std(record.torque) / max(np.std(record.position), 1e-30)) + 1e-300

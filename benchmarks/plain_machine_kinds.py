@@ -1,0 +1,329 @@
+"""Random plain machines and their logs, integrated by laws of their own.
+
+- `swing`: a pendulum that is let go without a motor, twice to four times from other angles; it has
+  gravity, Coulomb and viscous friction. Only ratios to its inertia show.
+- `stairs`: a drive whose speed loop holds one speed after the other, both ways, up to a greatest
+  one, as friction is measured; Coulomb and viscous friction, half of them with breakaway above.
+- `fan`: a drive that steps its torque and logs speed in rpm; the load grows with its square, beside
+  Coulomb and viscous friction.
+- `leg`: a joint under a proportional and derivative law of 1 kHz or more, of which targets and
+  angles alone are logged, at 50 to 400 Hz: a swept sine or steps; friction, half of them gravity, a
+  third a delay of 4 ms. The law's file says at which rate it ran.
+- `servo`: a hobby servo that logs position in 4096 steps and current in coarse counts, at 50 to
+  200 Hz: a swept sine, sines, or moves of one speed; friction that falls from breakaway, half of
+  them gravity, half of them friction under that load. Its law is not told.
+- `stage`: a table on a screw, in metres and newtons, that goes from place to place at several
+  speeds, logged at 1 kHz; friction of which half are unequal both ways, which a constant force
+  tells as well. Half of the second runs are the first ones with pushes added to the force. Half
+  of the laws, a position loop around a speed loop, are told.
+
+Friction scatters by 2 % from run to run, beside a torque that wanders.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numba
+import numpy as np
+from robot_joint import wandering
+
+from fjr_records.importers.import_map import parse_map
+from fjr_records.importers.importer import import_files
+from fjr_records.importers.record_file import ImportOptions
+
+BRISTLE, ACCELERATES_S, INNER_HZ, SMOOTHED = 0.003, 0.5, 8000.0, 0.3
+SIZES = {
+    "gravity.torque_nm": "gravity",
+    "coulomb_friction.motor_nm": "coulomb",
+    "viscous_friction.motor_nm_s_rad": "viscous",
+    "quadratic_friction.motor_nm_s2_rad2": "quadratic",
+    "stribeck_friction_motor.torque_nm": "breakaway",
+    "load_friction.coefficient": "of load",
+    "delay.time_s": "delay",
+    "torque_bias.torque_nm": "bias",
+}
+
+
+@dataclass(frozen=True)
+class Machine:
+    """A random machine and its records.
+
+    Attributes:
+        truth: inertia, and sizes by the names of `SIZES`.
+        rate_hz: of the records.
+        runs: (columns, samples) of each; a position may be a speed.
+        columns: of each run.
+        position: unit of positions and references.
+        swings: whether sizes show over the inertia only.
+        law: file of the controller that made the torque, where targets were logged; or empty.
+    """
+
+    truth: dict[str, float]
+    rate_hz: float
+    runs: list[np.ndarray]
+    columns: tuple[str, ...] = ("time", "position", "torque")
+    position: str = "1"
+    swings: bool = False
+    law: str = ""
+
+    def recorded(self, folder: Path, told: float) -> None:
+        """Import the records and write a datasheet with an inertia."""
+        folder.mkdir()
+        files = [folder / f"run_{number}.csv" for number in range(len(self.runs))]
+        for file, run in zip(files, self.runs, strict=True):
+            header = ",".join(self.columns)
+            np.savetxt(file, run.T, fmt="%.9g", delimiter=",", header=header, comments="")
+        law = folder / "law.yaml"
+        law.write_text(self.law)
+        laws = (law,) if self.law else ()
+        given = [f"{name}={name}:{self.position if name in ('position', 'reference') else 1}"
+                 for name in self.columns[1:]]  # fmt: skip
+        columns = parse_map(["time=time", *given], described=bool(laws))
+        import_files(files, folder / "bags", ImportOptions(columns=columns, controllers=laws))
+        (folder / "nominal.yaml").write_text(f"{{jm: {told!r}, k0: .inf}}\n")
+
+
+@numba.njit  # type: ignore[untyped-decorator]
+def moved(
+    wanted, gain, integral, damping, late, angle, inertia, gravity, coulomb, viscous, quadratic,
+    breakaway, fallen, of_load, pushed, step, touch, rate_hz, often, inner,
+):  # fmt: skip
+    """Return position, mean torque and speed.
+
+    With damping it is wanted positions, with a gain alone speeds, else torques. The law runs so
+    often in a sample; its torque comes late by so many of its runs, its speed through a filter.
+    """
+    dt, speed, bristle, sum_, torque = 1.0 / (rate_hz * inner), 0.0, 0.0, 0.0, 0.0
+    every, found = inner // often, np.zeros((3, wanted.size))
+    smooth, runs, waiting = 0.0, 0, np.zeros(late + 1)
+    for k in range(wanted.size):
+        found[0, k], found[2, k] = np.round(angle / step) * step, speed
+        for i in range(inner):
+            if gain == 0.0:
+                torque = wanted[k]
+            elif i % every == 0:
+                smooth += SMOOTHED * (speed - smooth)
+                if damping > 0.0:
+                    counted = np.round(angle / step) * step
+                    asked = gain * (wanted[k] - counted) - damping * smooth
+                else:
+                    error = wanted[k] - speed
+                    sum_ += integral * error * dt * every
+                    asked = gain * error + sum_
+                waiting[runs % waiting.size] = asked
+                runs += 1
+                torque = waiting[runs % waiting.size]
+            load = gravity * np.sin(angle)
+            level = coulomb + breakaway * np.exp(-((speed / fallen) ** 2)) + of_load * abs(load)
+            ends = touch if speed >= 0.0 else -touch
+            bristle = ends + (bristle - ends) * np.exp(-abs(speed) * dt / touch)
+            lost = level * bristle / touch + viscous * speed + quadratic * abs(speed) * speed
+            speed += dt * (torque + pushed[k] - lost - load) / inertia
+            angle += dt * speed
+            found[1, k] += torque / inner
+    return found
+
+
+def run_of(
+    truth: dict[str, float], wanted: np.ndarray, rate_hz: float, rng: np.random.Generator,
+    wanders: float, *, gain: float = 0.0, integral: float = 0.0, damping: float = 0.0,
+    angle: float = 0.0, fallen: float = 1.0, step: float = 1e-6, touch: float = BRISTLE,
+    pushed: np.ndarray | float = 0.0, often: int = 20,
+) -> np.ndarray:  # fmt: skip
+    """Return position, torque and speed of one run, (3, samples)."""
+    share, size = 1.0 + 0.02 * rng.standard_normal(), truth.get
+    inner = max(int(INNER_HZ / rate_hz), 20)
+    late = round(size("delay", 0.0) * rate_hz * inner / (inner // often))
+    return moved(
+        wanted, gain, integral, damping, late, angle, truth["inertia"], size("gravity", 0.0),
+        share * truth["coulomb"], share * truth["viscous"], size("quadratic", 0.0),
+        share * size("breakaway", 0.0), fallen, size("of load", 0.0),
+        wanders * truth["coulomb"] * wandering(rng, wanted.size, rate_hz) + size("bias", 0.0)
+        + pushed, step, touch, rate_hz, often, inner,
+    )  # fmt: skip
+
+
+def swing(rng: np.random.Generator) -> Machine:
+    """Draw a pendulum that is let go."""
+    rate, seconds = float(rng.choice([100, 200, 500])), float(rng.choice([5, 10, 20]))
+    inertia, natural = 10.0 ** rng.uniform(-3, 0.5), rng.uniform(3, 9)
+    gravity = inertia * natural**2
+    truth = {
+        "inertia": inertia,
+        "gravity": gravity,
+        "coulomb": gravity * rng.uniform(0.005, 0.06),
+        "viscous": 2.0 * inertia * natural * rng.uniform(0.005, 0.06),
+    }
+    step = 2.0 * np.pi / float(rng.choice([2**12, 2**14, 2**17]))
+    nothing, runs = np.zeros(int(rate * seconds)), []
+    for _ in range(rng.integers(2, 5)):
+        angle = rng.uniform(0.6, 2.5) * rng.choice([-1, 1])
+        found = run_of(truth, nothing, rate, rng, 0.01, angle=angle, step=step)
+        runs.append(np.array([np.arange(nothing.size) / rate, found[0], nothing]))
+    return Machine(truth, rate, runs, swings=True)
+
+
+def stairs(rng: np.random.Generator) -> Machine:
+    """Draw a drive that holds one speed after the other."""
+    rate, inertia = float(rng.choice([50, 100, 250])), 10.0 ** rng.uniform(-4, 0.5)
+    fastest, hold = rng.uniform(2, 60), float(rng.choice([2, 4]))
+    most = inertia * fastest / ACCELERATES_S * rng.uniform(0.5, 4)
+    truth = {"inertia": inertia, "coulomb": most * rng.uniform(0.2, 0.7)}
+    truth["viscous"] = (most - truth["coulomb"]) / fastest
+    fallen = fastest * rng.uniform(0.02, 0.1)
+    if rng.random() < 0.5:
+        truth["breakaway"] = 0.5 * truth["coulomb"]
+    speeds = fastest * np.geomspace(0.02, 1.0, int(rng.integers(5, 9)))
+    asked = np.concatenate([np.full(int(hold * rate), s) for one in speeds for s in (one, -one)])
+    asked = np.concatenate([np.zeros(int(rate)), asked])
+    wanted, most_change = np.zeros_like(asked), fastest / ACCELERATES_S / rate
+    for k in range(1, asked.size):
+        wanted[k] = wanted[k - 1] + np.clip(asked[k] - wanted[k - 1], -most_change, most_change)
+    step, bandwidth = 2.0 * np.pi / float(rng.choice([2**12, 2**16])), 20.0 * rng.uniform(1, 3)
+    gain, integral, runs = inertia * bandwidth, inertia * bandwidth**2 / 4.0, []
+    for _ in range(rng.integers(1, 4)):
+        found = run_of(
+            truth, wanted, rate, rng, 0.03, gain=gain, integral=integral, fallen=fallen, step=step
+        )
+        torque = found[1] + 0.02 * most * rng.standard_normal(wanted.size)
+        runs.append(np.array([np.arange(wanted.size) / rate, found[0], torque]))
+    return Machine(truth, rate, runs)
+
+
+def fan(rng: np.random.Generator) -> Machine:
+    """Draw a drive whose load grows with the square of its speed."""
+    rate, seconds = float(rng.choice([20, 50, 100])), float(rng.choice([60, 120]))
+    inertia, fastest = 10.0 ** rng.uniform(-5, -1), rng.uniform(50, 400)
+    slow = rng.uniform(0.5, 4)
+    most = inertia * fastest / slow
+    truth = {
+        "inertia": inertia,
+        "coulomb": most * rng.uniform(0.03, 0.2),
+        "viscous": most * rng.uniform(0.03, 0.2) / fastest,
+        "quadratic": most * rng.uniform(0.4, 0.8) / fastest**2,
+    }
+    samples, hold, runs = int(rate * seconds), int(3 * slow * rate), []
+    for _ in range(rng.integers(1, 4)):
+        asked = np.repeat(most * rng.uniform(0.1, 1.0, samples // hold + 1), hold)[:samples]
+        found = run_of(truth, asked, rate, rng, 0.02)
+        speed = found[2] + 0.002 * fastest * rng.standard_normal(samples)
+        torque = found[1] + 0.01 * most * rng.standard_normal(samples)
+        runs.append(np.array([np.arange(samples) / rate, speed * 30.0 / np.pi, torque]))
+    return Machine(truth, rate, runs, position="rpm")
+
+
+def leg(rng: np.random.Generator) -> Machine:
+    """Draw a joint whose targets and angles are logged more slowly than its law runs."""
+    rate, seconds = float(rng.choice([50, 100, 200, 400])), float(rng.choice([10, 20, 40]))
+    inertia, natural = 10.0 ** rng.uniform(-3, -0.5), 2.0 * np.pi * rng.uniform(2, 6)
+    gain, damping = inertia * natural**2, 2.0 * rng.uniform(0.2, 0.8) * inertia * natural
+    widest, highest_hz = rng.uniform(0.2, 0.8), min(rate / 12.0, rng.uniform(3, 8))
+    truth = {
+        "inertia": inertia,
+        "coulomb": gain * widest * rng.uniform(0.02, 0.25),
+        "viscous": damping * rng.uniform(0.1, 0.8),
+    }
+    if rng.random() < 0.5:
+        truth["gravity"] = gain * widest * rng.uniform(0.2, 0.8)
+    if rng.random() < 1.0 / 3.0:
+        truth["delay"] = 0.004
+    stamps, runs = np.arange(int(rate * seconds)) / rate, []
+    swept = np.sin(2.0 * np.pi * (0.1 * stamps + (highest_hz - 0.1) * stamps**2 / (2.0 * seconds)))
+    steps = np.sign(np.sin(np.pi * stamps)) * np.minimum(1.0, stamps)
+    for number in range(rng.integers(1, 4)):
+        target = widest * rng.uniform(0.6, 1.0) * (steps if number % 2 else swept)
+        found = run_of(
+            truth, target, rate, rng, 0.03, gain=gain, damping=damping, step=2.0 * np.pi / 2**16
+        )
+        runs.append(np.array([stamps, found[0], target]))
+    ran_hz = 20.0 * rate
+    filtered = -ran_hz * np.log(1.0 - SMOOTHED)
+    law = f"kind: pd\np: {gain}\nd: {damping}\nn: {filtered}\nderivative_on: measurement\n"
+    columns = ("time", "position", "reference")
+    return Machine(truth, rate, runs, columns, law=f"{law}rate_hz: {ran_hz}\n")
+
+
+def servo(rng: np.random.Generator) -> Machine:
+    """Draw a hobby servo that logs its current."""
+    rate, seconds = float(rng.choice([50, 100, 200])), float(rng.choice([10, 20, 40]))
+    inertia, natural = 10.0 ** rng.uniform(-3.5, -1.5), 2.0 * np.pi * rng.uniform(2, 6)
+    gain, damping = inertia * natural**2 * rng.uniform(1, 3), 1.4 * inertia * natural
+    widest = rng.uniform(0.3, 1.0)
+    usual = inertia * (3.0 * np.pi) ** 2 * widest
+    truth = {"inertia": inertia, "coulomb": usual * rng.uniform(0.2, 1.5)}
+    truth["viscous"] = usual * rng.uniform(0.05, 0.3) / (2.0 * np.pi * widest)
+    truth["breakaway"] = 0.3 * truth["coulomb"]
+    if rng.random() < 0.5:
+        truth["gravity"] = usual * rng.uniform(0.5, 2.0)
+        if rng.random() < 0.5:
+            truth["of load"] = 0.1
+    stamps, runs, count = np.arange(int(rate * seconds)) / rate, [], usual / 200.0
+    for _ in range(rng.integers(1, 5)):
+        kind = rng.integers(3)
+        if kind == 0:
+            target = np.sin(2.0 * np.pi * (0.1 * stamps + 0.75 * stamps**2 / seconds))
+        elif kind == 1:
+            waves = [np.sin(2.0 * np.pi * f * stamps + rng.uniform(0.0, 6.0))
+                     for f in rng.uniform(0.1, 1.5, 5)]  # fmt: skip
+            target = np.minimum(1.0, stamps) * sum(waves) / 3.0
+        else:
+            period = rng.uniform(2.0, 4.0)
+            phase = stamps % period / period
+            moves = np.where(phase < 0.5, 8.0 * phase - 1.0, 7.0 - 8.0 * phase)
+            target = np.clip(moves, -1.0, 1.0)
+        found = run_of(
+            truth, widest * target, rate, rng, 0.03, gain=gain, damping=damping, fallen=0.1,
+            angle=widest * target[0], step=2.0 * np.pi / 4096,
+        )  # fmt: skip
+        current = np.round(found[1] / count + 2.0 * rng.standard_normal(stamps.size))
+        runs.append(np.array([stamps, found[0], count * current]))
+    return Machine(truth, rate, runs)
+
+
+def stage(rng: np.random.Generator) -> Machine:
+    """Draw a positioning table."""
+    rate, seconds, mass = 1000.0, float(rng.choice([12, 25])), 10.0 ** rng.uniform(0, 2.5)
+    natural = 2.0 * np.pi * rng.uniform(3, 10)
+    gain, damping = mass * natural**2, 2.0 * mass * natural
+    fastest, accelerates = rng.uniform(0.05, 0.3), rng.uniform(0.5, 3)
+    truth = {"inertia": mass, "coulomb": mass * accelerates * rng.uniform(0.1, 0.5)}
+    truth["viscous"] = truth["coulomb"] / fastest * rng.uniform(0.3, 2)
+    if rng.random() < 0.5:
+        truth["bias"] = truth["coulomb"] * rng.uniform(0.1, 0.3) * rng.choice([-1, 1])
+    stamps, runs = np.arange(int(rate * seconds)) / rate, []
+    target, place = np.zeros(stamps.size), 0
+    while place < stamps.size:
+        speed, length = fastest * rng.uniform(0.1, 1.0), fastest * rng.uniform(0.3, 1.0)
+        times = np.arange(int((length / speed + speed / accelerates + 0.2) * rate)) / rate
+        asked = np.minimum(accelerates * times, speed)
+        asked = np.minimum(asked, np.maximum(accelerates * (times[-1] - 0.2 - times), 0.0))
+        way = np.cumsum(asked) / rate * (1 if target[place - 1] <= 0.0 else -1)
+        end = min(place + way.size, stamps.size)
+        target[place:end] = target[place - 1] + way[: end - place]
+        place = end
+    pushes = np.zeros(stamps.size)
+    if rng.random() < 0.5:
+        for start in rng.integers(0, stamps.size - 300, 8):
+            pushes[start : start + 200] = (
+                mass * accelerates * rng.uniform(0.3, 1) * rng.choice([-1, 1])
+            )
+    for number in range(2):
+        found = run_of(
+            truth, target, rate, rng, 0.03, gain=gain, damping=damping, step=1e-6, touch=2e-5,
+            pushed=pushes * number, often=1,
+        )  # fmt: skip
+        force = found[1] + pushes * number
+        runs.append(np.array([stamps, found[0], force, target]))
+    law = f"kind: pd\np: {gain}\nd: {damping}\nn: {-rate * np.log(1.0 - SMOOTHED)}\n"
+    law += "derivative_on: measurement\n"
+    columns = ("time", "position", "torque", "reference")
+    return Machine(truth, rate, runs, columns, "m", law=law if rng.random() < 0.5 else "")
+
+
+KINDS: dict[str, Callable[[np.random.Generator], Machine]] = {
+    "swing": swing, "stairs": stairs, "fan": fan, "leg": leg, "servo": servo,
+    "stage": stage,
+}  # fmt: skip
