@@ -69,14 +69,19 @@ def _source(module: str) -> Path | None:
     return None
 
 
-def _imported(module: str, source: Path) -> list[str]:
+def _imported(module: str, source: Path) -> tuple[str, ...]:
     """Return the names that a module imports; some are not modules but what these hold."""
     package = module if source.name == "__init__.py" else module.rpartition(".")[0]
+    return _imported_by(source.read_bytes(), package)
+
+
+@cache
+def _imported_by(text: bytes, package: str) -> tuple[str, ...]:
     names: list[str] = []
-    for node in ast.walk(ast.parse(source.read_bytes())):
+    for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.Import):
             names += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
             origin = resolve_name("." * node.level + (node.module or ""), package)
             names += [origin, *(f"{origin}.{alias.name}" for alias in node.names)]
-    return names
+    return tuple(names)
