@@ -7,7 +7,8 @@ pushes it by Coriolis and reaction torques, which no model of one axis has: a re
 the friction. The datasheet is an inertia alone. All is integrated here, by laws of its own.
 
 Counted are what is named but is not there, what is missed, the ratio of each size to the truth
-(inertia and gravity to their means over the motion), and how sure each name is.
+(inertia and gravity to their means over the motion), how many intervals hold it, and how sure each
+name is.
 """
 
 from __future__ import annotations
@@ -182,15 +183,19 @@ def row(number: int, axis: str, truth: dict[str, float], log: str, found: Diagno
     named = {e for cause in found.causes for e in (cause.effect, *cause.others)}
     wrong = [f"{c.effect} {c.present:.2f}" for c in found.causes
              if not {c.effect, *c.others} & (there | ALSO)]  # fmt: skip
-    ratios = []
+    ratios, inside = [], []
     for name, size in {"jm": "inertia", **SIZES}.items():
         given, true = found.parameters.get(name), truth.get(size)
-        ratios.append("-" if true is None or given is None else f"{given.value / true:.2f}")
+        if true is None or given is None:
+            ratios.append("-")
+            continue
+        ratios.append(f"{given.value / true:.2f}")
+        inside.append(given.low <= true <= given.high)
     sure = ", ".join(f"{c.effect} {c.present:.2f}" for c in found.causes)
     return (
         f"| {number} | {axis} | {log} | {', '.join(sorted(there - named)) or '-'} | "
         f"{', '.join(wrong) or '-'} | {' | '.join(ratios)} | {sure or found.verdict} | "
-        f"{spent_s:.0f} |"
+        f"{sum(inside)} of {len(inside)} | {spent_s:.0f} |"
     )
 
 
@@ -202,8 +207,8 @@ def main() -> None:
     given = parser.parse_args()
     print(describe() + "\n")
     print("| arm | axis | log | missed | wrong | inertia | Coulomb | viscous | gravity | named | "
-          "CPU s |")  # fmt: skip
-    print("|---" * 11 + "|", flush=True)
+          "in 95 % | CPU s |")  # fmt: skip
+    print("|---" * 12 + "|", flush=True)
     for number in range(given.cases):
         rng = np.random.default_rng([given.seed, number])
         with tempfile.TemporaryDirectory() as folder:

@@ -137,7 +137,7 @@ def investigate(
     found = look(tolerance, budget_s)
     took = time.monotonic() - begun
     bare = Model.nominal(nominal).plant
-    for times, supposed in further_looks.called_for(found).items():
+    for times, supposed in further_looks.called_for(found, bare).items():
         left = begun + budget_s - time.monotonic()
         if left < took:  # another look takes about as long
             break

@@ -26,11 +26,15 @@ _ALIKE = 1.2  # times the misfit: what leaves less does about as well
 _COMMON = 0.2  # range of the logarithms of ratios to the datasheet, within which one gain holds all
 
 
-def called_for(found: Investigation) -> dict[float, str]:
+def called_for(found: Investigation, nominal: Mapping[str, float]) -> dict[float, str]:
     """Return the further looks to take: how many tolerances for one, and what that supposes.
 
     None, unless a fit ended as far from the datasheet as it may go, or a gain is named. Where a
     recorded torque drives the model, whose noise an inertia may follow, the datasheet may be right.
+
+    Args:
+        found: the first look.
+        nominal: bare parameters of the datasheet.
     """
     if found.fitted is None:
         return {}
@@ -38,7 +42,7 @@ def called_for(found: Investigation) -> dict[float, str]:
     driven = not evidence.slow and None in evidence.player.loop.laws
     ended = _ended(found)
     looks = {}
-    if ended or _has_gain(found.diagnosis):
+    if ended or _has_gain(found.diagnosis, nominal):
         looks[WIDER] = "is further off"
     if ended and driven:
         looks[CLOSER] = "is right"
@@ -62,7 +66,7 @@ def says_more(
     """
     second, first = other.diagnosis, found.diagnosis
     left = [_left(diagnosis) for diagnosis in (second, first)]
-    if _has_gain(first) and _one_factor(second, nominal):
+    if _has_gain(first, nominal) and _one_factor(second, nominal):
         return False
     more_causes = first.effects and len(_beside(first)) < len(_beside(second))
     if times > 1.0 and (more_causes or _ended(other)):
@@ -104,9 +108,15 @@ def _ended(found: Investigation) -> bool:
     return bool(ended)
 
 
-def _has_gain(diagnosis: Diagnosis) -> bool:
-    """Tell whether a cause stands for a gain that the fits have no other parameter for."""
-    return any(fx.EFFECTS[effect].scales == "about one angle" for effect in diagnosis.effects)
+def _has_gain(diagnosis: Diagnosis, nominal: Mapping[str, float]) -> bool:
+    """Tell whether a cause stands for a gain that the fits have no other parameter for.
+
+    Beside a datasheet of a single value a gain of the torque is one, too: that value, which is then
+    far off, does the same.
+    """
+    given = [name for name, value in nominal.items() if value and math.isfinite(value)]
+    gains = ("about one angle", "everywhere") if len(given) == 1 else ("about one angle",)
+    return any(fx.EFFECTS[effect].scales in gains for effect in diagnosis.effects)
 
 
 def _beside(diagnosis: Diagnosis) -> list[str]:

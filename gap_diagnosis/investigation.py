@@ -185,7 +185,7 @@ def investigate_runs(
     if _misses(timing.fitter, timing.refit) > _HOPELESS and resists:
         names = []
     found = _searched(timing, names, progress, until)
-    if (other := timing.other_if_better(found.best)) is not None:
+    if (other := timing.other_if_better(found.best, names)) is not None:
         timing = other
         progress(f"search with a torque that is {'' if timing.held else 'not '}held")
         found = _searched(timing, names, progress, until)

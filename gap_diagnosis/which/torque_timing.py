@@ -6,7 +6,7 @@ are missing, a delay does in part what they would, and half a sample of it may d
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from fjr_kit.telling import Progress
@@ -45,20 +45,25 @@ class Timing:
     other: Timing | None = None
     late_s: float = 0.0
 
-    def other_if_better(self, best: CellFit) -> Timing | None:
+    def other_if_better(self, best: CellFit, sought: Sequence[str]) -> Timing | None:
         """Return the other way, if what was found speaks for it.
 
         A signal that was found to come half a sample late is one that is held; a torque that was
-        held while causes were missing may do clearly better as a signal beside them.
+        held while causes were missing may do clearly better as a signal beside them, and so may a
+        signal as a torque that is held, where no delay was sought.
+
+        Args:
+            best: what was found.
+            sought: identifiers of the effects that were looked for.
         """
         other = self.other
         if other is None:
             return None
-        if self.held:
-            as_signal = other.fitter.taken_over(best)
-            return other if gain(self.fitter, as_signal, best).present else None
         rate = self.fitter.evidence.records.sample_rate_hz
         late = [e for e in best.effects if e in _LATE and _half(best.model, e, rate)]
+        if self.held or not {*sought} & {*_LATE}:
+            in_the_other = other.fitter.taken_over(best)
+            return other if gain(self.fitter, in_the_other, best).present else None
         if not late:
             return None
         (effect,) = late[:1]

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from driven_runs import NOMINAL, driven_runs
 from gap_cases import simulate_case
 
 from fjr_sim_node.plant import PLANT
@@ -81,3 +83,16 @@ def test_a_wider_datasheet_must_not_need_more_causes_nor_end_at_a_limit(case):
     assert not says_more(told(lacking, 80.0), first, nominal, WIDER)
     assert not says_more(told(["delay", "torque_bias"], 40.0), first, nominal, WIDER)
     assert not says_more(told(["torque_bias", "viscous_friction"], 60.0), first, nominal, WIDER)
+
+
+def test_a_single_inertia_that_is_far_off_is_not_named_as_a_gain_of_the_torque():
+    """Of a datasheet of one value nothing tells them apart, and all sizes go with that gain."""
+    sizes = {"coulomb_friction.motor_nm": 20.0, "viscous_friction.motor_nm_s_rad": 20.0}
+    rig = dict.fromkeys(NOMINAL, 0.0) | {"jm": 0.5, "k0": math.inf}
+    records = driven_runs(rig=rig | {"fsm": 20.0, "fvm": 20.0})
+    effects = ["torque_gain", "coulomb_friction", "viscous_friction"]
+    found = investigate(records, rig | {"jm": 2.5}, effects=effects).diagnosis
+    assert {cause.effect for cause in found.causes} == {"coulomb_friction", "viscous_friction"}
+    for name, size in {"jm": 0.5, **sizes}.items():
+        assert found.parameters[name].value == pytest.approx(size, rel=0.02), name
+    assert "jm is 80 % below it" in found.notes[0]

@@ -46,9 +46,10 @@ def test_half_a_sample_of_delay_of_a_signal_is_a_torque_that_was_held(finer, hel
     by_signal = CellFitter(Evidence(flowing, NOMINAL), NOMINAL, 0.1)
     refit = by_signal.refit()
     timing = Timing(by_signal, refit, (CONTINUOUS,), False, Timing(by_hold, by_hold.refit()))
-    assert timing.other_if_better(refit) is None
+    assert timing.other_if_better(refit, ["delay"]) is None
     proposals = by_signal.screening(refit, "delay").proposals()
     late = by_signal.add(refit, "delay", proposals) if proposals else None
     samples = late.model.effects["delay.time_s"] * RATE if late else 0.0
     assert samples == pytest.approx(0.5 if held else 0.0, abs=0.1)
-    assert (timing.other_if_better(late or refit) is timing.other) == held
+    assert (timing.other_if_better(late or refit, ["delay"]) is timing.other) == held
+    assert (timing.other_if_better(refit, ["coulomb_friction"]) is timing.other) == held
