@@ -18,6 +18,7 @@ Residuals = Callable[[np.ndarray], np.ndarray]
 """Takes points (n, parameters), returns error vectors (n, errors)."""
 
 _STEP = 1e-6  # a loop near its stability margin bends within 1e-4 already
+_CENTRAL_STEP = 1e-4  # of central differences, in which such a bend cancels
 _DAMPINGS = np.array([1.0, 1e2])  # tried one after the other, times the present damping
 _LEAST_DAMPING, _MOST_DAMPING = 1e-7, 1e6
 _FRESH_DAMPING, _MUCH_DAMPING = 1.0, 1e2  # first tried with a fresh Jacobian; small steps beyond
@@ -84,6 +85,30 @@ def solve(
                 break
             search.renew()
     return Solution(search.x, search.cost, search.jacobian, search.r, search.converged)
+
+
+def central_differences(
+    residuals: Residuals, x: np.ndarray, low: np.ndarray, high: np.ndarray
+) -> np.ndarray:
+    """Return the Jacobian at a point, float64 (errors, parameters), from both sides within bounds.
+
+    That of a search was updated from step to step: it tells the way down, but hides what two
+    parameters do alike.
+
+    Args:
+        residuals: evaluates a batch of points.
+        x: the point.
+        low: lower bounds.
+        high: upper bounds.
+    """
+    size = np.diag(_CENTRAL_STEP * np.maximum(np.abs(x), 1.0))
+    free = np.flatnonzero(low < high)
+    sides = [np.clip(x + sign * size, low, high)[free] for sign in (1.0, -1.0)]
+    errors = residuals(np.concatenate(sides))
+    apart = np.sum(sides[0] - sides[1], axis=1)
+    jacobian = np.zeros((errors.shape[1], x.size))
+    jacobian[:, free] = ((errors[: free.size] - errors[free.size :]) / apart[:, None]).T
+    return jacobian
 
 
 def _cost(errors: np.ndarray) -> float:

@@ -7,9 +7,6 @@ import math
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
-
-import numpy as np
 
 from fjr_kit.telling import Progress
 from fjr_records.periodic import RecordedExperiment, RecordedRealization
@@ -18,12 +15,10 @@ from fjr_records.records import Record, RecordSet
 from .fits.cell_fits import DRIFT, CellFitter
 from .fits.comparison import NOTHING_LEFT, CellFit
 from .fits.estimates import moved_by_scatter, relative_scatter
-from .fits.gains import gain
 from .fits.unseen_friction import SCATTER
 from .gates.bag_deviations import GROUPS
 from .gates.bags_gate import as_bags, drift_of_runs, run_changes, scattering
 from .gates.run_inertias import different_inertias, inertias_differ
-from .how_far.ledger import Ledger
 from .how_far.steady_view import SteadyView
 from .model.evidence import Evidence
 from .model.quasi_static import NOTE as QUASI_STATIC
@@ -34,6 +29,7 @@ from .model.steady_runs import SteadyRuns
 from .outcome.cause import LEAST_PRESENT
 from .outcome.diagnosis import Bags, Diagnosis
 from .outcome.verdict_words import BACKWARDS, LOST, ROUNDING
+from .searching import at_its_time, misses, stepwise
 from .starts.catalogue import catalogue
 from .starts.search_space import TOLERANCE
 from .verdict.coarse_encoder import with_coarse_encoder
@@ -45,9 +41,8 @@ from .verdict.notes import of_fit, of_records, yielding
 from .verdict.tested_causes import Tested
 from .which.exchange import with_the_better_one
 from .which.found import Found
-from .which.late_torque import brought_to_its_time, is_late
+from .which.late_torque import is_late
 from .which.rounding import beside_rounding
-from .which.stepwise import Stepwise
 from .which.torque_timing import Timing, timed
 
 ASSUMED = (
@@ -58,8 +53,6 @@ ASSUMED = (
 _HOPELESS = 5.0
 """Times the motion: where the refit misses more, nothing is searched, for no effect mends that but
 friction where the datasheet has none at all, so that a torque drives the axis away."""
-_SEARCHES = 2
-"""With a torque that comes late and was brought forward: the first may mistake by how much."""
 _SEARCH_SHARE = 0.6
 """Of the budget for the search; the tests of what it found take about as long as one more step."""
 
@@ -182,21 +175,9 @@ def investigate_runs(
         fitter = CellFitter(Evidence(records, nominal, slow), model.plant, tolerance)
         timing = Timing(fitter, fitter.refit(), (QUASI_STATIC,))
     resists = any(model.plant.get(name) for name in GROUPS["friction"])
-    if _misses(timing.fitter, timing.refit) > _HOPELESS and resists:
+    if misses(timing.fitter, timing.refit) > _HOPELESS and resists:
         names = []
-    found = _searched(timing, names, progress, until)
-    if (other := timing.other_if_better(found.best, names)) is not None:
-        timing = other
-        progress(f"search with a torque that is {'' if timing.held else 'not '}held")
-        found = _searched(timing, names, progress, until)
-    for _ in range(_SEARCHES):
-        if time.monotonic() > until:
-            break
-        early = brought_to_its_time(timing, found.best, progress)
-        if early is None:
-            break
-        timing = early
-        found = _searched(timing, names, progress, until)
+    timing, found = at_its_time(timing, names, progress, until)
     fitter = timing.fitter
     if found.best.effects:
         fitter, found = beside_rounding(fitter, found, progress)
@@ -210,7 +191,7 @@ def investigate_runs(
     tied = tied_fits(fitter, found, tested, names)
     if (anew := with_the_better_one(found, tied, fitter)) and time.monotonic() < until:
         progress(f"search with {anew.best.effects[-1]}")
-        anew = _stepwise(fitter, names, progress, until).go_on(anew)
+        anew = stepwise(fitter, names, progress, until).go_on(anew)
         found, tested = kept(fitter, anew, scatter, progress, names, until)
         tied = tied_fits(fitter, found, tested, names)
     backwards = driven_backwards(evidence)
@@ -235,39 +216,6 @@ def investigate_runs(
     if order.effects is None or ROUNDING in order.effects:
         fitter, found, diagnosis = with_coarse_encoder(fitter, model, found, diagnosis)
     return Investigation(records, model, diagnosis, Fitted(fitter, found, tuple(tested), rivals))
-
-
-def _searched(timing: Timing, names: Sequence[str], progress: Progress, until: float) -> Found:
-    """Search from the refit; where a twist is known, also from what the motion alone has shown.
-
-    What a transmission lacks may be most of the twist's error, beside which friction and load, that
-    move both its ends, hardly show. What ends better counts, if that repeats on unseen parts.
-    """
-    fitter = timing.fitter
-    found = _stepwise(fitter, names, progress, until).run(timing.refit)
-    seen = fitter.evidence.twist is not None and time.monotonic() < until
-    if not seen or fitter.left_in_a_band(found.best) < NOTHING_LEFT:
-        return found
-    progress("by the motion alone")
-    alone = CellFitter(fitter.evidence.of_motion_alone(), fitter.nominal, fitter.tolerance)
-    shown = _stepwise(alone, names, progress, until).run(alone.refit())
-    progress("and then by the twist")
-    steps = [timing.refit, *(fitter.taken_over(fit) for fit in shown.steps[1:])]
-    begun = replace(shown, steps=steps, rivals={})
-    other = _stepwise(fitter, names, progress, until).go_on(begun)
-    return other if gain(fitter, other.best, found.best).present else found
-
-
-def _stepwise(
-    fitter: CellFitter, names: Sequence[str], progress: Progress, until: float
-) -> Stepwise:
-    misses = partial(_misses, fitter, parts=fitter.select_parts)
-    return Stepwise(fitter, names, progress, until, misses)
-
-
-def _misses(fitter: CellFitter, fit: CellFit, parts: Sequence[int] | None = None) -> float:
-    """Return which share of the motion a fit misses on some parts, by default those that report."""
-    return float(np.sqrt(np.mean(Ledger(fitter.evidence, parts).squares(fit.model))))
 
 
 def _run_scatter(

@@ -31,6 +31,9 @@ FORM_BESIDE = 0.03
 """The same beside a remainder; by 72 parameters of that check."""
 _LEFT_TO_OTHERS = 0.01
 """Of what is known of a parameter: where the others hold less, one group holds nearly all."""
+_ALIKE = 1e-13
+"""Least eigenvalue of a normal matrix with a unit diagonal: below it is the rounding of a Jacobian
+of what parameters do alike."""
 NORMAL_95 = 1.96
 
 
@@ -172,7 +175,7 @@ def moved_by_scatter(fit: CellFit, runs: np.ndarray, scatter: Mapping[str, float
     on = np.flatnonzero(change)
     variance = np.zeros(change.size)
     if on.size:
-        inverse = np.linalg.pinv(jacobian.T @ jacobian, rcond=1e-14)
+        inverse = inverted(jacobian.T @ jacobian)
         for run in np.unique(runs):
             rows = jacobian[runs == run]
             variance += np.sum((inverse @ (rows.T @ rows[:, on]) * change[on]) ** 2, axis=1)
@@ -234,14 +237,31 @@ def standard_errors(
     """
     normal = jacobian.T @ jacobian + np.diag(np.broadcast_to(prior, jacobian.shape[1]))
     inflation = max(1.0, float(residuals @ residuals) / residuals.size)
-    inverse = np.linalg.pinv(normal, rcond=1e-14)
+    inverse = inverted(normal)
     plain = inflation * np.abs(np.diag(inverse))
     shifts = []
     for group in np.unique(groups):
         j, r = jacobian[groups == group], residuals[groups == group]
-        others, score = np.linalg.pinv(normal - j.T @ j, rcond=1e-14), j.T @ r
+        others, score = inverted(normal - j.T @ j), j.T @ r
         alone = np.abs(np.diag(others)) * _LEFT_TO_OTHERS > np.abs(np.diag(inverse))
         shifts.append(np.where(alone, inverse @ score, others @ score))
     moved = np.array(shifts) - np.mean(shifts, axis=0)
     spread = (len(shifts) - 1) / len(shifts) * np.sum(moved**2, axis=0)
     return np.sqrt(np.maximum(plain, spread))
+
+
+def inverted(normal: np.ndarray) -> np.ndarray:
+    """Return the covariance of parameters from their normal matrix J^T J.
+
+    What parameters do alike, so that only their sum is seen, is hardly known of each: the
+    pseudoinverse would take it for known. A parameter that does nothing has no variance here.
+
+    Args:
+        normal: (parameters, parameters), positive semidefinite.
+    """
+    scale = np.sqrt(np.maximum(np.diag(normal), 0.0))
+    does = scale > 0.0
+    scale = np.where(does, scale, 1.0)
+    values, vectors = np.linalg.eigh(normal / np.outer(scale, scale))
+    found = (vectors / np.maximum(values, _ALIKE)) @ vectors.T
+    return np.asarray(found * np.outer(does / scale, does / scale))

@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fjr_kit.least_squares import solve
+from fjr_kit.least_squares import central_differences, solve
 from fjr_sim_node import effects as fx
 
 from ..model.evidence import Evidence
@@ -124,7 +124,9 @@ class ReweightedFits(Comparison):
         """Return a fit with one effect taken out and all else fitted anew.
 
         Its weights begin with what is left where the effect is missing: with those of the fit, the
-        cells in which it acts would pull all other parameters away. A ripple that stays is the one
+        cells in which it acts would pull all other parameters away. It begins where all else stood,
+        or where, to first order, all else does what the effect did, whichever leaves less: of two
+        that look alike each is greater by what the other takes away. A ripple that stays is the one
         that it was: with as few cycles as it takes it would be whatever was taken out.
         """
         names = tuple(n for n in fit.space.effects if not n.startswith(f"{effect}."))
@@ -134,7 +136,20 @@ class ReweightedFits(Comparison):
         ripples = {n: fit.model.effects[n] for n in names if fx.parameter(n).role == "cycles"}
         space = replace(fit.space, effects=names, units=units, cycles=ripples)
         rest = tuple(e for e in fit.effects if e != effect)
-        return self._begun(rest, space, space.point(fit.model))
+        begun = [space.point(fit.model), np.clip(_instead(fit, effect), *space.bounds())]
+        left = self.residuals(fit.variance, [space.model(point) for point in begun])
+        return self._begun(
+            rest, space, begun[int(np.argmin(self.weights.costs(fit.variance, left)))]
+        )
+
+    def differentiated(self, fit: CellFit) -> CellFit:
+        """Return a fit with the Jacobian at its point in place of that of its search."""
+
+        def errors_of(points: np.ndarray) -> np.ndarray:
+            return self.residuals(fit.variance, [fit.space.model(point) for point in points])
+
+        jacobian = central_differences(errors_of, fit.solution.x, *fit.space.bounds())
+        return replace(fit, solution=replace(fit.solution, jacobian=jacobian))
 
     def residuals(self, variance: np.ndarray, models: Sequence[Model]) -> np.ndarray:
         """Return the errors of models on the fitted parts, times their weights, (models, errors).
@@ -185,3 +200,18 @@ class ReweightedFits(Comparison):
         ended = replace(solution, residuals=left, jacobian=known, cost=float(left @ left))
         model = space.model(x)
         return CellFit(effects, space, model, ended, variance, self.left_by(model, variance))
+
+
+def _instead(fit: CellFit, effect: str) -> np.ndarray:
+    """Return a fit's point less an effect whose work all other parameters do, to first order.
+
+    Args:
+        fit: an explanation.
+        effect: one of its effects; only its sizes are taken for linear.
+    """
+    own, x, jacobian = len(fit.space.nominal), fit.solution.x, fit.solution.jacobian
+    of_it = np.array([False] * own + [n.startswith(f"{effect}.") for n in fit.space.effects])
+    sizes = [own + k for k, n in enumerate(fit.space.effects) if fx.parameter(n).role == "size"]
+    gone = [k for k in sizes if of_it[k]]
+    step = np.linalg.lstsq(jacobian[:, ~of_it], jacobian[:, gone] @ x[gone], rcond=1e-9)[0]
+    return np.asarray(x[~of_it] + step)

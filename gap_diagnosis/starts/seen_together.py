@@ -215,6 +215,8 @@ def solved(
         torque: (rows,).
         positive: so many of the first are not below zero.
     """
+    if not columns:
+        return [], float(np.sum(torque**2))
     scales = [float(np.sqrt(np.mean(column**2))) or 1.0 for column in columns]
     scaled = np.array(columns).T / scales
     corner = np.linalg.qr(np.column_stack([scaled, torque])).R  # as good as all rows

@@ -73,6 +73,7 @@ def kept(
     lacking = lacked(fitter.nominal)
     replaced: set[str] = set()
     bearing: set[str] = set()
+    released: set[str] = set()
     doubted: dict[str, float] = {}
     nearly_named: set[str] = set()
 
@@ -82,6 +83,8 @@ def kept(
 
     while steps[-1].effects:
         tested = tested or tests_of(steps[-1])
+        idle = {t.effect for t in tested if t.present < LEAST_BEARING} & bearing - released
+        bearing, released = bearing - idle, released | idle  # what it bore may have gone
         stay = {*bearing, *_bases(fitter, tested, names), *_lacked(lacking, tested)}
         free = _without(stay, tested)
         failed = [t for t in free if not t.passed]

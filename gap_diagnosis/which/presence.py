@@ -59,6 +59,7 @@ def cell_estimates(
         scatter: standard deviations of parameters from run to run, see `moved_by_scatter`.
         without: the fits that lack one of its effects, by that.
     """
+    fit = fitter.differentiated(fit)
     space, solution = fit.space, fit.solution
     prior = np.zeros(solution.x.size)
     if any(fx.EFFECTS[effect].scales == "everywhere" for effect in fit.effects):

@@ -7,10 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from gap_cases import SHORT, fitter_of, simulate_case
+from hypothesis import given
+from hypothesis import strategies as st
 
 from fjr_kit.least_squares import Solution
 from gap_diagnosis.fits.comparison import CellFit
-from gap_diagnosis.fits.estimates import form, kept_from_zero, linear_estimates, standard_errors
+from gap_diagnosis.fits.estimates import (
+    form,
+    inverted,
+    kept_from_zero,
+    linear_estimates,
+    standard_errors,
+)
 from gap_diagnosis.model.rig_model import Model
 from gap_diagnosis.outcome.cause_words import digits, percent
 from gap_diagnosis.outcome.gap_size import Estimate
@@ -210,3 +218,26 @@ def test_a_share_that_is_too_small_to_matter_is_said_to_be_so():
         "12%",
         "-0.20%",
     ]
+
+
+def test_what_two_parameters_do_alike_is_known_of_neither():
+    """Only the sum of Coulomb friction and a constant torque shows where a motor never turns."""
+    rng = np.random.default_rng(4)
+    one, other = rng.standard_normal((2, 4000))
+    group = np.arange(4000) // 400
+    apart = standard_errors(np.column_stack([one, other]), rng.standard_normal(4000), group)
+    alike = standard_errors(np.column_stack([one, other, one]), rng.standard_normal(4000), group)
+    assert (alike[[0, 2]] > 1e3 * apart[0]).all()
+    assert alike[1] == pytest.approx(apart[1], rel=0.3)
+
+
+@given(st.integers(0, 1000))
+def test_a_covariance_is_the_inverse_of_the_normal_matrix_and_zero_for_what_does_nothing(seed):
+    rng = np.random.default_rng(seed)
+    jacobian = rng.standard_normal((30, 4)) * 10.0 ** rng.uniform(-6, 6, 4)
+    found = inverted(jacobian.T @ jacobian)
+    exact = np.linalg.inv(jacobian.T @ jacobian)
+    assert np.abs(found / exact - 1.0).max() < 1e-6
+    jacobian[:, 2] = 0.0
+    found = inverted(jacobian.T @ jacobian)
+    assert not found[2].any() and not found[:, 2].any() and found[0, 0] > 0.0

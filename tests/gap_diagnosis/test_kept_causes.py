@@ -477,3 +477,33 @@ def test_a_size_beyond_what_machines_have_is_doubted_and_this_is_said(searched):
     assert over_usual(eccentric, "encoder_eccentricity") == pytest.approx(5.4)
     assert "0.27 rad is more than machines have" in unusual(eccentric, "encoder_eccentricity")
     assert over_usual(Model(NOMINAL, {"delay.time_s": 1.0}), "delay") == 0.0
+
+
+def test_what_others_needed_goes_when_they_no_longer_do(searched, monkeypatch):
+    """It stayed since a sure cause failed without it, and is nowhere to be seen after that went."""
+    fitter, fits = searched
+    sure = max(causes_with_tests(fitter, fits[3], fits[0], SCATTER), key=lambda t: t.present)
+    needless, bears, last = "stribeck_friction_motor", "delay", "torque_bias"
+
+    def told(_fitter, fit, *_):
+        found = []
+        for effect in fit.effects:
+            one = replace(sure, effect=effect, without=fitter.without(fit, effect))
+            if effect == needless:
+                seen = bears in fit.effects
+                gain = Gain(5.0, 4.0, 0.7, 0.01) if seen else Gain(-5.0, 4.0, 0.1, 0.9)
+                one = replace(one, gain=gain)
+            if effect == bears:
+                one = replace(one, certain=False, gain=Gain(9.0, 4.0, 0.7, 0.01))
+            found.append(one)
+        return found
+
+    monkeypatch.setattr(kept_causes_module, "causes_with_tests", told)
+    monkeypatch.setattr(kept_causes_module, "_in_its_place", lambda *_: None)
+    monkeypatch.setattr(kept_causes_module, "_twice", lambda *_: [])
+    monkeypatch.setattr(
+        kept_causes_module, "_bears", lambda tested, _: any(t.effect == bears for t in tested)
+        and tested[0].effect == needless and len(tested) == 3,
+    )  # fmt: skip
+    found, tested = kept(fitter, Found(fits), SCATTER, lambda _: None, fits[-1].effects)
+    assert found.best.effects == (last,) == tuple(t.effect for t in tested)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 import pytest
 from driven_runs import NOMINAL, RATE, driven_runs
@@ -15,6 +17,8 @@ from gap_diagnosis.model.record_torque import (
     mean_over_samples,
     with_continuous_torque,
 )
+from gap_diagnosis.searching import _again
+from gap_diagnosis.which.found import Found
 from gap_diagnosis.which.torque_timing import Timing, timed
 
 FINER = 10
@@ -53,3 +57,20 @@ def test_half_a_sample_of_delay_of_a_signal_is_a_torque_that_was_held(finer, hel
     assert samples == pytest.approx(0.5 if held else 0.0, abs=0.1)
     assert (timing.other_if_better(late or refit, ["delay"]) is timing.other) == held
     assert (timing.other_if_better(refit, ["coulomb_friction"]) is timing.other) == held
+
+
+def test_what_was_found_counts_where_there_is_no_time_to_search_again():
+    """A torque turned out to be held when the time was up; the causes found before are kept."""
+    causes = {"torque_bias.torque_nm": 4.0}
+    recorded = driven_runs(causes)
+    by_hold = CellFitter(Evidence(recorded, NOMINAL), NOMINAL, 0.1)
+    flowing = with_continuous_torque(recorded, by_hold.evidence.simulator.loop)
+    by_signal = CellFitter(Evidence(flowing, NOMINAL), NOMINAL, 0.1)
+    refit = by_signal.refit()
+    proposals = by_signal.screening(refit, "torque_bias").proposals()
+    before = Found([refit, by_signal.add(refit, "torque_bias", proposals)])
+    names, ended = ["torque_bias", "delay"], time.monotonic()
+    found = _again(Timing(by_hold, by_hold.refit()), before, names, lambda _: None, ended)
+    assert found.best.effects == ("torque_bias",) and not found.complete
+    assert found.best.model.effects["torque_bias.torque_nm"] == pytest.approx(4.0, rel=0.05)
+    assert by_hold.misfit(found.best) < by_signal.misfit(before.best)
