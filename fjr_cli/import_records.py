@@ -26,11 +26,13 @@ def import_records(
         typer.Option(
             "--map",
             metavar="SIGNAL=[-]COLUMN[:UNIT]",
-            help="Column of torque and position, perhaps of reference, link and time (or "
-            "torque_time, position_time, ... of signals with stamps of their own), separated by "
-            "commas, by name or by number from 0: position=theta:deg,torque=iq:0.25,time=t:ms. The "
-            "unit may be a factor or that of a speed; a minus turns the sign. Without it, what the "
-            "first file holds is listed.",
+            help="Column of torque and position, perhaps of reference, link, known_torque (of "
+            "gravity and other axes, by a robot model) and time (or torque_time, "
+            "position_time, ... of signals with stamps of their own), separated by "
+            "commas, by name or by number from 0: "
+            "position=theta:deg,torque=iq:0.25,time=t:ms. The unit may be a factor or "
+            "that of a speed; a minus turns the sign. Without it, what the first file "
+            "holds is listed.",
         ),
     ] = None,
     out: Annotated[

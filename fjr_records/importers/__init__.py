@@ -14,7 +14,8 @@ hold) and `importer.write_bags`.
   sampled together; `part` cuts the part that is asked for, `refresh` finds signals that are
   refreshed more slowly than they are logged.
 - Signals: `words` restores signs that a log left out, `wraps` turns that an encoder leaves out;
-  `integrals` makes angles of speeds, `made_torque` the torque of a described controller.
+  `integrals` makes angles of speeds, `made_torque` the torque of a described controller;
+  `known_torque` is what a robot model says that other axes and gravity need of the torque.
 - The kind of run: `repetition` and `coherence` say whether a run is periodic and whether its
   signals belong together; `describe` tells repeats from realizations. `doubts` says what is
   evidently wrong, of which `impossible` is what no axis gives.

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from fjr_kit.errors import InputError
 
+from .known_torque import KNOWN
 from .source import Heading
 from .stated_units import stated_unit, unit_of
 
@@ -31,11 +32,13 @@ UNITS: Mapping[str, Mapping[str, float]] = {
     "torque": _TORQUE | _FORCE,
     "position": _ANGLE | _LENGTH | _TURNING | _SLIDING,
     "link": _ANGLE | _LENGTH | _TURNING | _SLIDING,
+    KNOWN: _TORQUE | _FORCE,
     "time": _TIME,
     "reference_time": _TIME,
     "torque_time": _TIME,
     "position_time": _TIME,
     "link_time": _TIME,
+    f"{KNOWN}_time": _TIME,
 }
 """Units of each quantity with their factors to rad, N m and s, or to m and N of a linear axis; the
 first is the default."""
@@ -131,7 +134,7 @@ def _by_number(mark: str) -> str:
 def parse_map(
     specs: Sequence[str], *, described: bool = False, swings_free: bool = False
 ) -> dict[str, Column]:
-    """Parse `quantity=[-]column[:unit]` for reference, torque, position, link and their stamps.
+    """Parse `quantity=[-]column[:unit]` of all quantities of `UNITS`.
 
     Args:
         specs: one for each quantity.
@@ -139,8 +142,9 @@ def parse_map(
         swings_free: whether no torque acts, so that none is to be mapped.
 
     Raises:
-        InputError: a quantity or unit is unknown, named twice, or position or torque is missing; or
-            a torque is mapped where none acts.
+        InputError: a quantity or unit is unknown, named twice, or position or torque is missing; a
+            torque is mapped where none acts, or a known one where none is recorded or a controller
+            makes it.
     """
     columns: dict[str, Column] = {}
     for spec in specs:
@@ -161,6 +165,11 @@ def parse_map(
         raise InputError(
             "the map has a torque, though no torque is said to act; leave out torque=..., or "
             "--swings-free."
+        )
+    if KNOWN in columns and ("torque" not in columns or described):
+        raise InputError(
+            f"the map has {KNOWN}, which is taken off a recorded torque that then drives the "
+            f"model: map torque=COLUMN{' and leave out --controller' if described else ''}."
         )
     if missing == ["torque"] and (swings_free or (described and "reference" in columns)):
         missing = []

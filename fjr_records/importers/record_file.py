@@ -17,6 +17,7 @@ from .columns import read_columns
 from .doubts import doubts_of_signals, doubts_of_values
 from .import_map import OWN_TIME, TIME, Column, is_linear, is_time, refuse_both_axes
 from .integrals import DRIFTS, integrals
+from .known_torque import without_known
 from .made_torque import MADE, ONCE, SWINGS_FREE, made_torque
 from .own_stamps import own_stamps
 from .part import LEAST_SAMPLES
@@ -216,7 +217,8 @@ def understand(
         values, errors = resample(path, timing, values, rate_hz)
         notes += errors
     values, integrated = integrals(values, columns, rate_hz)
-    notes += integrated
+    values, known = without_known(values)
+    notes += (*integrated, *known)
     signals = {SYMBOLS[quantity]: each for quantity, each in values.items()}
     if law is not None and "u" not in signals:
         signals["u"] = made_torque(law, signals["r"], signals["y"], rate_hz)

@@ -16,6 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from .known_torque import KNOWN
 from .part import LEAST_SAMPLES
 from .record_file import Samples
 
@@ -88,7 +89,7 @@ def _mended(samples: Samples, k: int, first: int) -> Samples:
     rows = slice(first, first + k * count, k)
     taken = {
         quantity: each[first : first + k * count].reshape(count, k).mean(axis=1)
-        if quantity == "torque"
+        if quantity in ("torque", KNOWN)
         else each[rows]
         for quantity, each in values.items()
     }

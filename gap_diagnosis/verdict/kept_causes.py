@@ -14,12 +14,14 @@ from fjr_sim_node import effects as fx
 from ..fits.cell_fits import CellFitter
 from ..fits.comparison import CellFit
 from ..fits.gains import NEARLY_ALL, gain, left_of, stands_for
+from ..how_far.ledger import Ledger
 from ..outcome.cause import LEAST_PRESENT
 from ..starts.seen_together import lacked
 from ..which.equivalents import founded, partners
 from ..which.found import Found
 from .judgement import FEWEST_PARTS
 from .not_named import beyond_named, unsure, why_not
+from .spoiling import spoils, unspoiled
 from .tested_causes import Tested, causes_with_tests
 
 _MAY_BE_UNSURE = 2
@@ -50,8 +52,8 @@ def kept(
     gains least of all. Of those that pass, what names another one twice goes, and what is not sure,
     but for the two that gain most and for what others cannot do without: a cause that is sure is
     lost where the fit lacks what it acts beside. Friction that the datasheet lacks stays unless
-    something is against it: without it all else would bend to do what it does. Where too little is
-    held out, no cause is kept.
+    something is against it: without it all else would bend to do what it does. Of causes that spoil
+    the runs which report none is kept, and none at all where too little is held out.
 
     Args:
         fitter: of the search.
@@ -70,7 +72,7 @@ def kept(
     tested: list[Tested] = []
     if steps[-1].effects:
         steps[-1] = fitter.settled(steps[-1])
-    lacking = lacked(fitter.nominal)
+    lacking, ledger = lacked(fitter.nominal), Ledger(fitter.evidence)
     replaced: set[str] = set()
     bearing: set[str] = set()
     released: set[str] = set()
@@ -92,7 +94,13 @@ def kept(
         guessed = [] if failed else _without(stay, _guesses(tested, lacking))
         failed = failed or guessed
         if not failed:
-            break
+            good = unspoiled(ledger, steps)
+            if len(good) == len(steps):
+                break
+            gone = [e for e in steps[-1].effects if e not in good[-1].effects]
+            notes.append(spoils(gone))
+            steps, tested = good, []
+            continue
         blurred = any(t.passes_beside_size and not t.certain for t in failed)
         weakest = min(free if blurred else failed, key=lambda t: t.gain.mean)
         before = [fit for fit in steps if weakest.effect not in fit.effects]

@@ -11,6 +11,7 @@ from test_evidence import NOMINAL, SCATTER, records
 
 from gap_diagnosis.fits.cell_fits import CellFitter
 from gap_diagnosis.fits.gains import Gain, beside_others
+from gap_diagnosis.how_far.ledger import Ledger
 from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.model.rig_model import Model
 from gap_diagnosis.outcome.cause import LEAST_PRESENT
@@ -31,6 +32,7 @@ from gap_diagnosis.verdict.kept_causes import (
 )
 from gap_diagnosis.verdict.not_named import _bent, _changing, _kin
 from gap_diagnosis.verdict.notes import unusual
+from gap_diagnosis.verdict.spoiling import spoils, unspoiled
 from gap_diagnosis.verdict.tested_causes import causes_with_tests
 from gap_diagnosis.which import stepwise
 from gap_diagnosis.which.found import Found
@@ -507,3 +509,17 @@ def test_what_others_needed_goes_when_they_no_longer_do(searched, monkeypatch):
     )  # fmt: skip
     found, tested = kept(fitter, Found(fits), SCATTER, lambda _: None, fits[-1].effects)
     assert found.best.effects == (last,) == tuple(t.effect for t in tested)
+
+
+def test_causes_that_spoil_the_runs_which_report_are_taken_away(searched):
+    """A delay of 60 ms, where the rig has 1 ms, is what no test on other runs can excuse."""
+    fitter, fits = searched
+    ledger = Ledger(fitter.evidence)
+    assert unspoiled(ledger, fits) == fits
+    model = fits[-1].model
+    late = Model(model.plant, {**model.effects, "delay.time_s": 0.06})
+    spoilt = replace(fits[-1], model=late)
+    kept_steps = unspoiled(ledger, [*fits[:-1], spoilt])
+    best = min(fits[:-1], key=lambda fit: ledger.squares(fit.model).sum())
+    assert kept_steps[-1] is best and len(kept_steps) < len(fits)
+    assert "delay" in spoils(["delay"]) and "not named" in spoils(["delay"])
