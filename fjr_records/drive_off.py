@@ -7,6 +7,7 @@ rests by itself, without a torque and where it takes none, is explained, and is 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,7 +21,10 @@ _LEAST_S, _LEAST = 0.1, 20  # of the end of a run at which a drive is off; sampl
 _MARGIN_S = 0.02  # left out beside it, while brake and drive change over
 _STILL = 1e-3  # of the travelled range: the most that a held axis moves
 _STEPS = 1.5  # of the encoder: the most that it then reads beside one value
-_NEAR = 0.05  # of the travelled range: other times at which the axis passes the same place
+_NEAR = 0.05, 0.1, 0.2  # of the travelled range: passes that are told of the same place
+_EACH_SIDE = 0.5  # of the torque that a place takes: the least that it takes on either side
+_SMOOTH_S = 0.03  # to either side, for accelerations
+_BREAKS_AWAY = 2.0  # times the friction of a motion: the most that one at rest holds
 _TAKES = 0.3  # of the torque's rms while the drive is on: the least torque that a place takes
 _OFF = 0.1  # of the torque's rms: the most that is seen while the drive is off
 _LEFT = 0.25  # of the run: the least that is left
@@ -76,8 +80,9 @@ def off_ends(torque: np.ndarray, position: np.ndarray, rate_hz: float) -> Off | 
     kept = slice(ends[0], position.size - ends[1])
     if not any(ends) or position[kept].size < _LEFT * position.size:
         return None
-    on, passed = torque[kept], position[kept]
-    takes = [_taken(on, passed, y, _NEAR * travel) for y in (position[0], position[-1])]
+    passed = position[kept]
+    on = _without_inertia(torque[kept], passed, rate_hz)
+    takes = [_taken(on, passed, y, travel) for y in (position[0], position[-1])]
     begin, end = (n if taken else 0 for n, taken in zip(ends, takes, strict=True))
     if not begin and not end:
         return None
@@ -102,22 +107,87 @@ def _without_torque(
     return count if count >= least else 0
 
 
-def _taken(torque: np.ndarray, position: np.ndarray, place: float, near: float) -> float:
+def _taken(torque: np.ndarray, position: np.ndarray, place: float, travel: float) -> float:
     """Return the torque that a place takes while the drive is on (N m); 0 where none is evident.
 
-    It is what the passes of both directions have in common: friction goes both ways. A weight or a
-    load shows in the mean torque as well, and an inertia does not.
+    It is what the passes of both directions have in common, as near to the place as there are both:
+    friction goes both ways, and one that holds the axis may be greater than that of its motion. A
+    weight or a load shows in the mean torque as well. A spring with a preload takes one torque
+    above the place where it rests, the opposite one below, and none there.
     """
-    passes = np.abs(position - place) <= near
-    away = np.gradient(position)
-    ways = [torque[passes & (away * way > 0.0)] for way in (1.0, -1.0)]
-    if not all(each.size for each in ways):
+    mean, away = float(torque.mean()), position - place
+    ways = ways_of(position, _NEAR[0] * travel)
+    for near in _NEAR:
+        at = np.abs(away) <= near * travel
+        common, friction = _common(torque, ways * at)
+        if not math.isnan(common):
+            break
+    beside = [_common(torque, ways * (at & (side * away >= 0.0)))[0] for side in (1.0, -1.0)]
+    if math.isnan(common) or any(each * common < _EACH_SIDE * common**2 for each in beside):
         return 0.0
-    there, mean = [float(np.median(each)) for each in ways], float(torque.mean())
-    least = _TAKES * float(np.sqrt(np.mean(torque**2)))
-    taken = sum(there) / 2.0
-    agrees = min(one * mean for one in there) > 0.0
-    return taken if agrees and min(abs(taken), abs(mean)) >= least else 0.0
+    least = max(_TAKES * float(np.sqrt(np.mean(torque**2))), _BREAKS_AWAY * friction)
+    return common if common * mean > 0.0 and min(abs(common), abs(mean)) >= least else 0.0
+
+
+def _without_inertia(torque: np.ndarray, position: np.ndarray, rate_hz: float) -> np.ndarray:
+    """Return a torque, smooth, less what goes with the acceleration, (samples,) in N m.
+
+    Where an axis turns it accelerates alike before and after: that is no torque of the place.
+    """
+    half = min(max(int(_SMOOTH_S * rate_hz), 2), (position.size - 1) // 2)
+    window = np.hanning(2 * half + 3)[1:-1]
+    smooth, u = (
+        np.convolve(np.pad(signal, half, mode="edge"), window / window.sum(), "valid")
+        for signal in (position, torque)
+    )
+    acceleration = np.gradient(np.gradient(smooth))
+    off_mean = acceleration - acceleration.mean()
+    inertia = max(float(off_mean @ u) / max(float(off_mean @ off_mean), 1e-300), 0.0)
+    return u - inertia * acceleration
+
+
+def _common(torque: np.ndarray, ways: np.ndarray) -> tuple[float, float]:
+    """Return what the torques of both directions have in common, and half of what they differ by.
+
+    Both are in N m, and NaN where one of the directions is not passed.
+    """
+    passes = [torque[ways == way] for way in (1.0, -1.0)]
+    if not all(each.size for each in passes):
+        return math.nan, math.nan
+    there, back = (float(np.median(each)) for each in passes)
+    return (there + back) / 2.0, abs(there - back) / 2.0
+
+
+def ways_of(position: np.ndarray, least: float) -> np.ndarray:
+    """Return in which direction each sample goes further than its move did before; 0 where none.
+
+    A move is from where the axis turns to where it turns next. It turns where it then comes back by
+    `least`. So noise and steps of an encoder at rest, and friction that gives way, are no passes.
+
+    Args:
+        position: y, float64 (samples,), rad.
+        least: the least move (rad).
+
+    Returns:
+        float64 (samples,): 1, -1 or 0.
+    """
+    ways, way, begin, low, high = np.zeros(position.size), 0, 0, 0, 0
+    moves: list[tuple[int, int, int]] = []
+    values = position.tolist()
+    for now, value in enumerate(values):
+        low = now if value < values[low] else low
+        high = now if value > values[high] else high
+        if way >= 0 and values[high] - value >= least:
+            moves.append((way, begin, high))
+            way, begin, low = -1, high, now
+        elif way <= 0 and value - values[low] >= least:
+            moves.append((way, begin, low))
+            way, begin, high = 1, low, now
+    moves.append((way, begin, position.size - 1))
+    for sign, first, last in moves:
+        furthest = np.maximum.accumulate(sign * position[first : last + 1])
+        ways[first + 1 : last + 1] = sign * (np.diff(furthest) > 0.0)
+    return ways
 
 
 def without_off_ends(records: RecordSet) -> RecordSet:

@@ -69,7 +69,8 @@ def cut(records: RecordSet, hop: int, run_in: int = 0) -> list[Part]:
     """Cut records into parts, and give each a purpose.
 
     Levels of three records or more have whole records for each purpose; of two, the second one
-    selects and reports, block by block; a single one serves all three.
+    selects and reports, block by block; a single one serves all three. Stretches of long records
+    serve each purpose as early as late, so that a drift does not part them.
 
     Args:
         records: the records.
@@ -79,8 +80,12 @@ def cut(records: RecordSet, hop: int, run_in: int = 0) -> list[Part]:
     parts, first = [], -(-run_in // hop)
     for number, level in enumerate(records.levels):
         members = [i for i, r in enumerate(records.records) if r.level == level]
-        members.sort(key=lambda i: -float(np.abs(records.records[i].torque).max()))
-        for place, index in enumerate(members):
+        places = list(range(len(members)))
+        if any(records.records[i].after_s for i in members):
+            places = [min(place % 6, 5 - place % 6) for place in places]
+        else:
+            members.sort(key=lambda i: -float(np.abs(records.records[i].torque).max()))
+        for place, index in zip(places, members, strict=True):
             count = windows_in(records.records[index].samples, hop)
             blocks = max((count - first) // _WINDOWS_PER_BLOCK, 1)
             ends = np.linspace(first, count, blocks + 1).astype(int)

@@ -137,6 +137,7 @@ class RecordSimulator:
         """Return the state in which the law of a run enters it; None for zero."""
         law, record = self.loop.laws[index], self.records.records[index]
         rests = self._starts[index] == (0.0, 0.0) and self.loop.added[index] is None
+        rests &= record.after_s == 0.0
         if law is None or record.reference is None or rests:
             return None
         return law.entering_state(record.reference, record.position, record.torque)

@@ -50,8 +50,8 @@ def held_at(
 ) -> float | None:
     """Return where a link is held (rad), from which the encoder need not count.
 
-    A run that begins at rest begins there; one that moves already does so about it. None where no
-    link is held.
+    A run that begins at rest begins there; one that moves already does so about it, and so does a
+    stretch of a run, which friction may hold elsewhere. None where no link is held.
 
     Args:
         record: the run.
@@ -60,7 +60,7 @@ def held_at(
     """
     if not math.isinf(nominal["j"]):
         return None
-    if start[1] == 0.0:
+    if start[1] == 0.0 and not record.after_s:
         return start[0]
     return float(record.position.mean() - record.torque.mean() / nominal["k0"])
 
