@@ -16,6 +16,7 @@ _ROUNDED = 1e-6  # of a play: what rounding leaves of it where it is crossed
 _SETTLED = 4.0  # times z: the way after which 2 % of the change is left
 _LEFT_OUT = 1.5  # stations from a turn to the middle of the first that is kept
 _FAR = 40  # stations to either side of a turn that are compared
+_TURNS = 5  # at the least: what differs past a single one may be anything
 _WAYS = np.geomspace(0.25, 16.0, 25)  # z, in stations
 _UNEXPLAINED = 0.75  # of the squares: the most that is left once such a way is seen
 _MISSING = 0.1  # of the change, at the first place: less is not waited for
@@ -62,7 +63,7 @@ def yields_over(runs: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]]) -> fl
             station, float64 (stations,), the first station after each turn left out.
     """
     way, before, change, speed = np.concatenate([_passed_twice(*run) for run in runs], axis=1)
-    if way.size < _FAR:
+    if np.sum(way == _LEFT_OUT) < _TURNS:
         return 0.0
     plain = np.stack([np.ones(way.size), speed], axis=1)
     least, found = _UNEXPLAINED * _squares_left(plain, change)[0], 0.0
