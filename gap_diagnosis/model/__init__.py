@@ -5,9 +5,9 @@
 begun by `gain_search`) or the observer of `prediction`, with a torque as `record_torque` takes it.
 Steady periods are runs of one mean period (`steady_runs`, begun at `near_steady` states);
 `simulated_rig.Simulator` repeats all their periods for the BLA. Of records too slow for inertia
-`quasi_static` takes the torque; `record_length` bounds how long records may be. `evidence` cuts the
-errors into windows (`lapped`), cells (of bands, `octaves`) and `parts`, with the `twist` of a
-transmission whose link has an encoder; a torque counts as the motion that it would make against
-the loop (`held_motion`). `nominal` reads datasheets, `controller_check` compares torque and law,
-`discretisation` measures the simulation's own error.
+`quasi_static` takes the torque, where friction slides (`sliding`); `record_length` bounds how long
+records may be. `evidence` cuts the errors into windows (`lapped`), cells (of bands, `octaves`) and
+`parts`, with the `twist` of a transmission whose link has an encoder; a torque counts as the motion
+that it would make against the loop (`held_motion`). `nominal` reads datasheets, `controller_check`
+compares torque and law, `discretisation` measures the simulation's own error.
 """

@@ -5,7 +5,7 @@ at which no motion of the rig could be followed. Nothing is lost by that: what t
 overcome is known from angle, direction and speed alone. So no motion is played; the torque that a
 model needs along the recorded motion is compared with the recorded one (inverse dynamics without
 inertia). Each run is averaged over equal ways first, its **stations**: rest counts no more than
-motion.
+motion, and where the motion has just turned round nothing is compared (`sliding`).
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from fjr_sim_node.plant.statics import torque_along
 
 from .record_loop import RecordLoop
 from .rig_model import Model
+from .sliding import behind_play, sliding, yields_over
 
 NOTE = (
     "Of motion as slow as this only what acts at rest or in slow motion can be seen: friction, "
@@ -73,16 +74,29 @@ def stations(records: RecordSet, nominal: Mapping[str, float]) -> Stations | Non
     length = sum(float(np.abs(moves).sum()) for moves, _ in travels) / _STATIONS
     if not length > 0.0:
         return None
-    found = [
-        _averaged(r, *travel, still, length, rate)
-        for r, travel, still in zip(runs, travels, slow, strict=True)
-    ]
-    if min(record.samples for record, *_ in found) < _FEWEST:
+
+    def averaged(ways: Sequence[np.ndarray]) -> list[tuple[Record, np.ndarray, np.ndarray]]:
+        each = zip(runs, travels, ways, slow, strict=True)
+        return [_averaged(r, moves, way, still, length, rate) for r, (moves, _), way, still in each]
+
+    found = averaged([sliding(moves, length) for moves, _ in travels])
+    over = yields_over([(record.torque, speed, way) for record, speed, way in found])
+    if over > 1.0:
+        longer = averaged([sliding(moves, over * length) for moves, _ in travels])
+        found = longer if _enough(longer) else found
+    if not _enough(found):  # it turns round all the time: better friction on its way than nothing
+        found = averaged([direction for _, direction in travels])
+    if not _enough(found):
         return None
     made, speeds, directions = zip(*found, strict=True)
     seconds = sum(r.samples for r in runs) / rate
     stations_hz = sum(record.samples for record in made) / seconds
     return Stations(replace(records, sample_rate_hz=stations_hz, records=made), speeds, directions)
+
+
+def _enough(found: Sequence[tuple[Record, np.ndarray, np.ndarray]]) -> bool:
+    """Tell whether every run has stations enough."""
+    return min(record.samples for record, *_ in found) >= _FEWEST
 
 
 def _inertia_share(record: Record, rate: float, inertia: float, noise_rad: float) -> np.ndarray:
@@ -116,10 +130,7 @@ def _travel(position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         _JITTER * float(np.median(np.abs(np.diff(position)))),
         _LEAST_MOVE * float(np.ptp(position)),
     )
-    followed, at = np.empty(position.size), float(position[0])
-    for k, place in enumerate(position.tolist()):
-        at = min(max(at, place - width), place + width)
-        followed[k] = at
+    followed = behind_play(position, width)
     moves = np.diff(followed, prepend=followed[0])
     last = np.maximum.accumulate(np.where(moves != 0.0, np.arange(moves.size), -1))
     direction = np.where(last >= 0, np.sign(moves[last]), 0.0)
