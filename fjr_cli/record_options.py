@@ -14,10 +14,11 @@ MapSignals = Annotated[
     list[str] | None,
     typer.Option(
         "--map",
-        metavar="SIGNAL=TOPIC:FIELD[JOINT]",
+        metavar="SIGNAL=TOPIC:FIELD[JOINT][:FACTOR]",
         help="Where reference, torque, position or link stands in foreign bags, such as "
-        "position=/joint_states:position\\[elbow]; reference=none or link=none leaves it out. "
-        "Repeatable.",
+        "position=/joint_states:position\\[elbow]; a factor leads to rad and N m, as from a "
+        "current: torque=/joint_states:effort\\[elbow]:12. reference=none or link=none leaves it "
+        "out. Repeatable.",
     ),
 ]
 SamplesPerPeriod = Annotated[

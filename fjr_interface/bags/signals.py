@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -17,9 +18,14 @@ from .definitions import DefinitionError, typestore
 from .joint_state import FIELDS, Layout, LayoutError
 from .mcap_index import gather
 
-_SPEC = re.compile(r"(?P<topic>[\w/~]+)(:(?P<field>[\w.]+)(\[(?P<joint>[^\[\]]+)\])?)?\Z")
+_SPEC = re.compile(
+    r"(?P<topic>[\w/~]+)(:(?P<field>[A-Za-z_][\w.]*)(\[(?P<joint>[^\[\]]+)\])?)?"
+    r"(:(?P<factor>[-+.\deE]+))?\Z"
+)
 _NONE = "none"
 
+GREATEST_FACTOR = 1e12
+"""A factor to SI lies between this and its inverse."""
 MAX_MESSAGE = 2**20
 """Greatest size in bytes of a message that carries a signal."""
 
@@ -33,22 +39,37 @@ class SignalSource:
         field: field of the message, dotted if nested (`position`, `wrench.torque.z`).
         joint: joint name (or index) in an array field; None takes the first value.
         required: whether a bag without the topic is refused.
+        factor: from its numbers to SI, with the sign.
     """
 
     topic: str
     field: str
     joint: str | None = None
     required: bool = True
+    factor: float = 1.0
 
     @classmethod
     def parse(cls, text: str, default_field: str) -> SignalSource:
-        """Parse `topic[:field[[joint]]]`; raise InputError on anything else."""
+        """Parse `topic[:field[[joint]]][:factor]`; raise InputError on anything else."""
         match = _SPEC.match(text)
         if match is None:
             raise InputError(
-                f"signal source {text!r} is not understood; write it as /topic:field[joint]."
+                f"signal source {text!r} is not understood; write it as /topic:field[joint], or "
+                "with a factor to SI as /topic:field[joint]:factor."
             )
-        return cls(match["topic"], match["field"] or default_field, match["joint"])
+        source = cls(match["topic"], match["field"] or default_field, match["joint"])
+        if match["factor"] is None:
+            return source
+        try:
+            factor = float(match["factor"])
+        except ValueError:
+            factor = math.nan
+        if not 1.0 / GREATEST_FACTOR <= abs(factor) <= GREATEST_FACTOR:
+            raise InputError(
+                f"signal source {text!r}: its factor to SI is not understood; give a number other "
+                "than zero, as in effort[elbow]:12 for 12 N m/A."
+            )
+        return replace(source, factor=factor)
 
     def find(self, topics: Iterable[str], bag: str) -> str | None:
         """Return the bag's topic that this source means; None if absent and not required.
@@ -94,7 +115,7 @@ class SignalMap:
 
     @classmethod
     def parse(cls, specs: Iterable[str]) -> SignalMap:
-        """Parse `signal=/topic:field[joint]` for any of reference, torque, position and link.
+        """Parse `signal=/topic:field[joint][:factor]` of reference, torque, position and link.
 
         What is not named keeps its default; `reference=none` and `link=none` leave it out.
 
@@ -139,7 +160,7 @@ def decode(block: Block, source: SignalSource, bag: str) -> tuple[np.ndarray, np
     """Decode one signal of a block of messages.
 
     Returns:
-        (stamps, values): int64 nanoseconds and float64, both of shape (messages,).
+        (stamps, values): int64 nanoseconds and float64 in SI, both of shape (messages,).
 
     Raises:
         InputError: the messages have no such field or joint, no header stamp, or are corrupted.
@@ -154,6 +175,11 @@ def decode(block: Block, source: SignalSource, bag: str) -> tuple[np.ndarray, np
             f"{bag}: {block.topic.name}: has messages of {block.sizes.max()} bytes, more than the "
             f"{MAX_MESSAGE} allowed of a signal; map another topic."
         )
+    stamps, values = _decoded(block, source, bag)
+    return stamps, values if source.factor == 1.0 else source.factor * values
+
+
+def _decoded(block: Block, source: SignalSource, bag: str) -> tuple[np.ndarray, np.ndarray]:
     if block.topic.type == JOINT_STATE and source.field in FIELDS and len(block.starts):
         try:
             return _decode_joint_states(block, source)

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from fjr_interface.bags.signals import GREATEST_FACTOR
 from fjr_kit.errors import InputError
 
 from .known_torque import KNOWN
@@ -48,8 +49,6 @@ LINEAR = frozenset({*_LENGTH, *_FORCE, *_SLIDING})
 """Units of a linear axis."""
 SPEEDS = frozenset({*_TURNING, *_SLIDING})
 """Units of a speed, whose integral is the angle."""
-GREATEST_FACTOR = 1e12
-"""A factor to SI lies between this and its inverse."""
 REQUIRED = ("torque", "position")
 
 

@@ -59,6 +59,23 @@ def test_joint_states_of_a_named_joint(tmp_path, frames):
     assert record.reference is None and record.link is None
 
 
+@pytest.mark.parametrize("factor", [12.0, -0.5, 1.7453292519943295e-2])
+def test_a_factor_leads_to_si_as_from_a_current_or_from_degrees(tmp_path, factor):
+    stamps = np.arange(1, 51) * 2 * MS
+    bag = foreign_bag(tmp_path / "bag", {"/joint_states": joint_states(stamps)})
+    maps = ["position=/joint_states:position[shoulder]", "reference=none"]
+    mapped = SignalMap.parse([*maps, f"torque=/joint_states:effort[shoulder]:{factor!r}"])
+    (record,) = BagReader(bag, mapped).blocks(100)
+    assert record.torque.tolist() == [factor * -float(i) for i in range(50)]
+    assert record.position.tolist() == [i / 8 for i in range(50)]
+
+
+@pytest.mark.parametrize("factor", ["0", "nan", "1e999", "1e-300", "-", "1.2.3"])
+def test_a_factor_that_leads_nowhere_is_refused(factor):
+    with pytest.raises(InputError, match=r"factor to SI|not understood"):
+        SignalMap.parse([f"torque=/joint_states:effort[elbow]:{factor}"])
+
+
 def test_other_message_types_by_dotted_field(tmp_path):
     kind = "geometry_msgs/msg/WrenchStamped"
     types = STORE.types
