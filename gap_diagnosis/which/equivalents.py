@@ -64,6 +64,20 @@ def founded(
     return [effect for effect in effects if has_base(effect)]
 
 
+def loaded(effects: Sequence[str], beside: Collection[str]) -> list[str]:
+    """Return those of some effects that have a load to act on in a run in which no torque acts.
+
+    Without a motor's torque the gear carries what gravity or a spring asks for, and else nothing: a
+    loss in it would then act on the torque that holds the model to the record.
+
+    Args:
+        effects: identifiers.
+        beside: identifiers of the explanation to which one of them is to be added.
+    """
+    carried = any(fx.EFFECTS[effect].load is not None for effect in beside)
+    return [effect for effect in effects if carried or not fx.EFFECTS[effect].of_load]
+
+
 def plainness(
     effects: Sequence[str], parameters: Sequence[str], laws: Sequence[Sequence[str]]
 ) -> tuple[bool, int, int]:

@@ -14,7 +14,7 @@ from ..fits.comparison import NOTHING_LEFT, CellFit
 from ..fits.gains import NEARLY_ALL, Gain, gain, left_of, likelihood, stands_for
 from ..starts.screening import Proposal, Screening
 from ..starts.seen_together import LACKED, lacked
-from .equivalents import ONE_CAUSE, founded, holders, partners, plainness
+from .equivalents import ONE_CAUSE, founded, holders, loaded, partners, plainness
 from .friction_left import FRICTION
 from .polish import MOST, MUCH_LESS, OUTDATED, Polish, ranked
 
@@ -62,6 +62,8 @@ class Extension:
         there = {*parent.effects, *tried, *of_one_law}
         effects = [e for e in names if e not in there]
         effects = founded(effects, parent.effects, nominal, names)
+        if self._fitter.evidence.records.swings_free:
+            effects = loaded(effects, parent.effects)
         screened = self.screened(parent, effects)
         later = bool(parent.effects)
         proposals = self._proposed(parent, screened, _PROPOSED[later])

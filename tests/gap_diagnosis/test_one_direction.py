@@ -132,3 +132,16 @@ def test_a_drive_that_coasts_down_by_coulomb_friction_alone_is_diagnosed(tmp_pat
     found = diagnose(imported(tmp_path, runs, [], free=True), {"jm": INERTIA})
     assert "coulomb_friction" in found.effects
     assert found.parameters["coulomb_friction.motor_nm"].value == pytest.approx(COASTING, rel=0.05)
+
+
+def test_a_short_coast_has_the_friction_of_its_bearings_and_no_loss_under_a_load(tmp_path):
+    """Nothing loads its gear: a loss there would only damp what holds the model to the record."""
+    rng, runs = np.random.default_rng(2), []
+    for wanted in (20.0, 30.0, 40.0):
+        speed, _ = spindle(rng, wanted, (0.02, 4e-4, 0.0), 30.0, 0.0)
+        runs.append({"rpm": speed * RPM + 0.1 * rng.standard_normal(speed.size)})
+    found = diagnose(imported(tmp_path, runs, [], free=True), {"jm": INERTIA})
+    named = {e for cause in found.causes for e in (cause.effect, *cause.others)}
+    assert "coulomb_friction" in named
+    assert not named & {"load_friction", "directional_loss"}
+    assert found.parameters["coulomb_friction.motor_nm"].value == pytest.approx(0.02, rel=0.15)
