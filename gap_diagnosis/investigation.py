@@ -19,6 +19,7 @@ from .fits.unseen_friction import SCATTER
 from .gates.bag_deviations import GROUPS
 from .gates.bags_gate import as_bags, drift_of_runs, run_changes, scattering
 from .gates.run_inertias import different_inertias, inertias_differ
+from .gates.run_loads import different_loads, loads_differ
 from .how_far.steady_view import SteadyView
 from .model.evidence import Evidence
 from .model.quasi_static import NOTE as QUASI_STATIC
@@ -223,15 +224,20 @@ def _run_scatter(
 ) -> tuple[Bags | None, dict[str, float], list[str]]:
     """Return how far parameters scatter from run to run, seen or assumed, and sentences on it.
 
-    Where the inertia of runs differs, their friction only seems to scatter: that is not known.
+    Where inertia or load of runs differs, their friction only seems to scatter: that is not known.
     """
     evidence = fitter.evidence
     changes = run_changes(evidence, best.variance, best.model)
-    if inertias := different_inertias(evidence, best.model):
+    inertias = different_inertias(evidence, best.model)
+    loads = different_loads(evidence, best.model)
+    if inertias or loads:
+        linear = evidence.records.linear
+        told = [inertias_differ(inertias, linear)] if inertias else []
+        told += [loads_differ(loads, linear)] if loads else []
         bags = None if changes is None else as_bags(changes, evidence)
         if bags is not None:
             bags = bags.model_copy(update={"scatter_known": False})
-        return bags, relative_scatter(bags), [inertias_differ(inertias, evidence.records.linear)]
+        return bags, relative_scatter(bags), told
     if changes is None and fitter.misfit(best) < NOTHING_LEFT:
         return None, {}, []  # what scatters would be left on runs that no fit has seen
     if changes is None:

@@ -4,6 +4,7 @@ Bags go in; a list of checks with value, limit and a sentence comes out, and wha
 say. Begin with `gate_checks` (whole bags, one grid, periodic response, controller identity,
 discretisation). `stationarity` compares the periods of a bag without a model; `bags_gate` asks last
 whether the rig changes from bag to bag, by `bag_deviations` of each parameter and by
-`bag_changes`, which parts a trend from scatter. `run_inertias` tells runs of different inertia.
+`bag_changes`, which parts a trend from scatter. `run_inertias` tells runs of different inertia,
+`run_loads` those of different load.
 `data_notes` says what to record for more.
 """

@@ -6,6 +6,7 @@ What is left of torque and acceleration beyond friction and load tells the inert
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,6 +15,7 @@ import numpy as np
 
 _STRETCHES = 8  # of a run, each of which is left out once
 _PLACES = 10  # for each size that is solved for
+_SHOWN = 0.1  # of a constant torque: what no friction or load stands for
 _NOTHING = 1e-300
 
 
@@ -26,7 +28,8 @@ class SeenInertia:
         torque: recorded, (places,), N m.
         missing: torque that the model lacks, (places,), N m.
         moves: acceleration as the torque is seen, (places,), rad/s2.
-        beside: frictions and loads of a size of one, as seen, (sizes, places), N m.
+        beside: loads and frictions of a size of one, as seen, (sizes, places), N m; the first one a
+            constant torque.
         swung: the same of a mass of one behind a spring, of a frequency (rad/s) and a damping
             ratio, (places,).
     """
@@ -60,6 +63,34 @@ class SeenInertia:
     def share(self) -> float:
         """Share of the torque that accelerates the inertia, rms."""
         return float(self.value * np.std(self.moves) / (np.std(self.torque) + _NOTHING))
+
+    @property
+    def load(self) -> tuple[float, float, float]:
+        """The constant torque that the run needs more than the model has, and what tells it, N m.
+
+        Returns:
+            That torque; its standard error by leaving out single stretches (jackknife); and how far
+            it must be off to double the squares that are left with it. All NaN where it looks like
+            all else together, as in a run in one direction.
+        """
+        stretch = np.arange(self.missing.size) * _STRETCHES // self.missing.size
+        every = np.ones(self.missing.size, bool)
+        values = [self._load(stretch != k)[0] for k in range(_STRETCHES)]
+        value, weight, left = self._load(every)
+        error = float(np.sqrt(_STRETCHES - 1.0) * np.std(values))
+        return value, error, float(np.sqrt(left / (weight + _NOTHING)))
+
+    def _load(self, rows: np.ndarray) -> tuple[float, float, float]:
+        """Return the load of some places, the square of what shows it, and the squares left."""
+        constant, others = self.beside[0, rows], self.beside[1:, rows]
+        basis = _basis(np.concatenate([others, self.moves[None, rows]]))
+        missing = -self.missing[rows]
+        alone, left = (x - basis @ (basis.T @ x) for x in (constant, missing))
+        weight = float(alone @ alone)
+        if weight < _SHOWN**2 * float(constant @ constant):
+            return math.nan, math.nan, math.nan
+        value = _slope(alone, left)
+        return value, weight, float(np.sum((left - value * alone) ** 2))
 
     @cached_property
     def _left(self) -> tuple[np.ndarray, np.ndarray]:

@@ -1,6 +1,8 @@
-"""Runs of different inertia are told apart from scatter of friction and from sprung masses."""
+"""Runs of other inertia or load are told apart from scatter of friction and from sprung masses."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from fjr_sim_node.simulation.closed_loop import simulate
 from gap_diagnosis.any_record import investigate
 from gap_diagnosis.fits.cell_fits import CellFitter
 from gap_diagnosis.gates.run_inertias import RunInertia, different_inertias, inertias_differ
+from gap_diagnosis.gates.run_loads import RunLoad, different_loads, loads_differ
 from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.model.nominal import datasheet
 from gap_diagnosis.model.rig_model import Model
@@ -28,7 +31,9 @@ def wave(rng: np.random.Generator, top_hz: float) -> np.ndarray:
     return wanted / wanted.std() * np.minimum(1.0, np.arange(samples) / RATE)
 
 
-def recorded(seed: int, factors: tuple[float, ...], hz: float = 0.0) -> RecordSet:
+def recorded(
+    seed: int, factors: tuple[float, ...], hz: float = 0.0, loads: tuple[float, ...] = ()
+) -> RecordSet:
     """Return runs of a random axis of 1 kg m2 at most, whose friction scatters by 2 to 5 %.
 
     Its friction falls from breakaway and yields before it slides. Amplitude and band are others in
@@ -38,6 +43,7 @@ def recorded(seed: int, factors: tuple[float, ...], hz: float = 0.0) -> RecordSe
         seed: of all that is random.
         factors: of the inertia in each run.
         hz: frequency of a load on a spring, half of the inertia; 0 for a rigid axis.
+        loads: constant torque against the motor in each run, over its usual torque; none if empty.
     """
     rng = np.random.default_rng(seed)
     total, amplitude = 10.0 ** rng.uniform(-3.0, 0.0), rng.uniform(0.1, 0.6)
@@ -55,6 +61,7 @@ def recorded(seed: int, factors: tuple[float, ...], hz: float = 0.0) -> RecordSe
             "stribeck_friction_motor.velocity_rad_s": 0.3 * amplitude,
             "presliding_friction.motor_rad": 2e-3 * amplitude,
             "gravity.torque_nm": weight,
+            "torque_bias.torque_nm": -usual * loads[number] if loads else 0.0,
         }
         if hz:
             stiffness = 0.5 * total * (2.0 * np.pi * hz) ** 2
@@ -79,24 +86,56 @@ def recorded(seed: int, factors: tuple[float, ...], hz: float = 0.0) -> RecordSe
     return RecordSet("test", RATE, tuple(runs))
 
 
-def told(runs: RecordSet, seed: int, frictions: bool) -> list[RunInertia]:
-    """Return the different inertias beside the refit, or beside one with plain frictions."""
+def as_linear(runs: RecordSet) -> RecordSet:
+    """Return the same runs as those of a linear axis, on which no load goes with the angle."""
+    described = [r.description.model_copy(update={"axis": "linear"}) for r in runs.records]
+    each = zip(runs.records, described, strict=True)
+    return replace(runs, records=tuple(replace(r, description=d) for r, d in each))
+
+
+def fitted(runs: RecordSet, seed: int, frictions: bool) -> tuple[Evidence, Model]:
+    """Return the evidence and the refit, or one with plain frictions."""
     total = 10.0 ** np.random.default_rng(seed).uniform(-3.0, 0.0)
     nominal = datasheet({"jm": 1.05 * total}, "test")
     fitter = CellFitter(Evidence(runs, nominal), Model.nominal(nominal).plant, 0.1)
     fit = fitter.refit()
     for effect in FRICTIONS if frictions else ():
         fit = fitter.add(fit, effect, fitter.screening(fit, effect).proposals()) or fit
+    return fitter.evidence, fit.model
+
+
+def told(runs: RecordSet, seed: int, frictions: bool) -> list[RunInertia]:
+    """Return the different inertias beside such a fit, over that of the rig."""
+    total = 10.0 ** np.random.default_rng(seed).uniform(-3.0, 0.0)
     return [
         RunInertia(run.name, run.value / total, run.error / total)
-        for run in different_inertias(fitter.evidence, fit.model)
+        for run in different_inertias(*fitted(runs, seed, frictions))
     ]
 
 
-def test_friction_that_scatters_is_never_told_as_inertia():
-    same = (1.0,) * 4
-    alarms = [seed for seed in range(RIGS) if told(recorded(seed, same), seed, bool(seed % 2))]
+def test_friction_that_scatters_is_never_told_as_inertia_or_load():
+    alarms = []
+    for seed in range(RIGS):
+        evidence, model = fitted(recorded(seed, (1.0,) * 4), seed, bool(seed % 2))
+        alarms += different_inertias(evidence, model) + different_loads(evidence, model)
+        evidence.records = as_linear(evidence.records)
+        alarms += different_loads(evidence, model)
     assert alarms == []
+
+
+def test_a_load_in_half_of_the_runs_is_told_with_its_value():
+    """Of a fifth of the usual torque, on linear axes: gravity of an angle may look like it."""
+    missed = 0
+    for seed in range(10):
+        runs = recorded(seed, (1.0,) * 4, loads=(0.0, 0.2, 0.0, 0.2))
+        assert different_loads(*fitted(runs, seed, bool(seed % 2))) == []
+        found = different_loads(*fitted(as_linear(runs), seed, bool(seed % 2)))
+        rng = np.random.default_rng(seed)
+        usual = 10.0 ** rng.uniform(-3.0, 0.0) * rng.uniform(0.1, 0.6) * 150.0
+        missed += not found
+        values = [run.value / usual for run in found]
+        assert not found or np.diff(values) == pytest.approx([0.2, -0.2, 0.2], rel=0.15)
+    assert missed <= 1
 
 
 def test_a_payload_in_half_of_the_runs_is_told_with_its_values():
@@ -111,7 +150,8 @@ def test_a_payload_in_half_of_the_runs_is_told_with_its_values():
 def test_a_load_on_a_spring_is_not_told_as_another_inertia_in_each_run(hz):
     """It is of another inertia at each frequency, and the runs are of different bands."""
     for seed in range(6):
-        assert told(recorded(seed, (1.0,) * 4, hz), seed, frictions=True) == []
+        evidence, model = fitted(recorded(seed, (1.0,) * 4, hz), seed, frictions=True)
+        assert different_inertias(evidence, model) == different_loads(evidence, model) == []
 
 
 def test_the_sentence_names_runs_and_stands_in_place_of_scatter():
@@ -131,3 +171,9 @@ def test_of_many_runs_the_least_and_the_greatest_are_told():
     assert "mass" in note and "kg," in note and "kg m2" not in note
     assert "1 in run_0, 2.1 in run_11" in note and "of 12 runs" in note
     assert "run_5" not in note
+
+
+def test_the_sentence_on_loads_counts_from_the_least():
+    found = [RunLoad(f"run_{k}", value, 0.1, 1.0) for k, value in enumerate((3.0, -1.0, 39.0))]
+    note = loads_differ(found, linear=True)
+    assert "beyond run_1 need run_0 4, run_2 40 N (" in note and "force" in note
