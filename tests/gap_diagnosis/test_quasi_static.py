@@ -144,7 +144,7 @@ def test_what_inertia_moves_is_no_slow_motion():
 
 
 def test_a_model_that_misses_more_than_the_motion_names_nothing(monkeypatch):
-    monkeypatch.setattr("gap_diagnosis.investigation._misses", lambda *_, **__: 9.0)
+    monkeypatch.setattr("gap_diagnosis.investigation.misses", lambda *_, **__: 9.0)
     records = slow_record(RIPPLE)
     slow = stations(records, SMOOTH)
     diagnosis = investigate_runs(records, Order(SMOOTH), slow).diagnosis
