@@ -16,6 +16,8 @@ from ..where.remainder import looks_like
 from .bootstrap import Choice, ratio, stage_figures
 
 _MOST_PLACES = 4
+RUNS_AWAY = 10.0
+"""Times the squared gap of the refit: how far a model runs away beyond that says nothing."""
 
 
 class Ledger:
@@ -169,8 +171,12 @@ class Ledger:
         return self.places(np.sqrt(squares / self.evidence.floor(self.parts)))
 
     def share(self, without: Model, best: Model, refit: Model) -> Figure:
-        """Return how much of what the refit left comes back without a cause, with its interval."""
-        lost, gap = self.squares(without) - self.squares(best), self.squares(refit)
+        """Return how much of what the refit left comes back without a cause, with its interval.
+
+        A model that runs away without it counts as `RUNS_AWAY` times that.
+        """
+        gap = self.squares(refit)
+        lost = np.minimum(self.squares(without), RUNS_AWAY * gap.mean()) - self.squares(best)
         return ratio(lost, gap, Choice.among(range(gap.size), np.zeros(gap.size)))
 
     def remainder(self, best: Model, refit: Model) -> Remainder:

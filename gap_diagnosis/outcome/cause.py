@@ -38,7 +38,7 @@ class Cause(ResultModel):
         others: effects that these data cannot tell from it.
         present: probability that it, or one of the others, is there.
         share: how much of the squared gap that the refit left comes back if the cause is left out
-            and all else is fitted anew.
+            and all else is fitted anew; at most about ten, where the model then runs away.
         invariance_p: how often chance alone makes its sizes differ so much between levels; None
             where there is one level only.
         where: where leaving it out shows most.

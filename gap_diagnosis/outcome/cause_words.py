@@ -40,6 +40,8 @@ TORQUE = (
 )
 LEAST_PERCENT = 1e-3
 """A smaller share is shown as less than that: its digits mean nothing to a reader."""
+MOST_SHARE = 9.0
+"""A greater one is that of a model which runs away without the cause."""
 NO_SHARE = "none seen"
 """What stands for a share that may be zero or less."""
 _MOST_DIGITS = 6
@@ -169,10 +171,13 @@ def cause_name(cause: Cause) -> str:
 def share_words(figure: Figure | None) -> str:
     """Return a share with its interval, in percent; a dash where there is none.
 
-    A share that does not differ from nothing is said to be none: its digits mean nothing.
+    A share that does not differ from nothing is said to be none, and one of a model that runs away
+    without the cause to be more than it can be told: their digits mean nothing.
     """
     if figure is None or not known(figure.value):
         return "-"
+    if figure.value > MOST_SHARE:
+        return f"over {percent(MOST_SHARE)}"
     if not closes(figure):
         return NO_SHARE
     if figure.low is None or figure.high is None:

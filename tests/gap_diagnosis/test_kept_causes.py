@@ -523,3 +523,13 @@ def test_causes_that_spoil_the_runs_which_report_are_taken_away(searched):
     best = min(fits[:-1], key=lambda fit: ledger.squares(fit.model).sum())
     assert kept_steps[-1] is best and len(kept_steps) < len(fits)
     assert "delay" in spoils(["delay"]) and "not named" in spoils(["delay"])
+
+
+def test_a_model_that_runs_away_without_a_cause_has_a_bounded_share(searched):
+    """How far it runs is a matter of where it is stopped, and no share of a gap."""
+    fitter, fits = searched
+    ledger, model = Ledger(fitter.evidence), fits[-1].model
+    away = Model(model.plant, {**model.effects, "delay.time_s": 0.2})
+    assert ledger.squares(away).mean() > 100.0 * ledger.squares(fits[0].model).mean()
+    share = ledger.share(away, model, fits[0].model)
+    assert 9.0 < share.value <= 10.0 and share.high < 30.0
