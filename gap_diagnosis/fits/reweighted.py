@@ -125,7 +125,7 @@ class ReweightedFits(Comparison):
 
         Its weights begin with what is left where the effect is missing: with those of the fit, the
         cells in which it acts would pull all other parameters away. It begins where all else stood,
-        or where, to first order, all else does what the effect did, whichever leaves less: of two
+        and where, to first order, all else does what the effect did, if that leaves less: of two
         that look alike each is greater by what the other takes away. A ripple that stays is the one
         that it was: with as few cycles as it takes it would be whatever was taken out.
         """
@@ -138,9 +138,12 @@ class ReweightedFits(Comparison):
         rest = tuple(e for e in fit.effects if e != effect)
         begun = [space.point(fit.model), np.clip(_instead(fit, effect), *space.bounds())]
         left = self.residuals(fit.variance, [space.model(point) for point in begun])
-        return self._begun(
-            rest, space, begun[int(np.argmin(self.weights.costs(fit.variance, left)))]
-        )
+        stood, instead = self.weights.costs(fit.variance, left)
+        found = self._begun(rest, space, begun[0])
+        if not instead < stood:
+            return found
+        other = self._begun(rest, space, begun[1])
+        return other if self.gains(other, found).sum() > 0.0 else found
 
     def differentiated(self, fit: CellFit) -> CellFit:
         """Return a fit with the Jacobian at its point in place of that of its search."""
