@@ -18,6 +18,7 @@ from .fits.estimates import moved_by_scatter, relative_scatter
 from .fits.unseen_friction import SCATTER
 from .gates.bag_deviations import GROUPS
 from .gates.bags_gate import as_bags, drift_of_runs, run_changes, scattering
+from .gates.by_run import seen_by_run
 from .gates.run_inertias import different_inertias, inertias_differ
 from .gates.run_loads import different_loads, loads_differ
 from .how_far.steady_view import SteadyView
@@ -228,8 +229,8 @@ def _run_scatter(
     """
     evidence = fitter.evidence
     changes = run_changes(evidence, best.variance, best.model)
-    inertias = different_inertias(evidence, best.model)
-    loads = different_loads(evidence, best.model)
+    seen = seen_by_run(evidence, best.model)
+    inertias, loads = different_inertias(evidence, seen), different_loads(evidence, seen)
     if inertias or loads:
         linear = evidence.records.linear
         told = [inertias_differ(inertias, linear)] if inertias else []

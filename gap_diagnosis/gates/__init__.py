@@ -5,6 +5,6 @@ say. Begin with `gate_checks` (whole bags, one grid, periodic response, controll
 discretisation). `stationarity` compares the periods of a bag without a model; `bags_gate` asks last
 whether the rig changes from bag to bag, by `bag_deviations` of each parameter and by
 `bag_changes`, which parts a trend from scatter. `run_inertias` tells runs of different inertia,
-`run_loads` those of different load.
+`run_loads` those of different load, by what each shows (`by_run`).
 `data_notes` says what to record for more.
 """

@@ -9,21 +9,16 @@ frequency.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from ..model.evidence import Evidence
-from ..model.rig_model import Model
-from ..model.steady_runs import SteadyRuns
-from ..starts.other_splits import YIELDS
 from ..starts.seen_inertia import SeenInertia
 from ..starts.seen_resonance import masses
-from ..starts.seen_torques import SeenTorques
+from .by_run import ERRORS, LISTED, RunValue, ends
 
 _DIFFERS = 0.1  # of the greatest inertia, between two runs
-_ERRORS = 5.0  # standard errors of the difference of two runs
 _LAW = 0.02  # of each inertia: what no law of a catalogue is right about
 _SHARE = 0.25  # of a run's torque, rms, that accelerates: less of it shows no inertia
 _WORSE = 2.0
@@ -31,58 +26,31 @@ _WORSE = 2.0
 inertia, whose friction scattered by 2 to 5 %, none whose runs all accelerate enough left more than
 1.4 times as much. Of 20 others, of which half of the runs carry a payload, 19 are told at 20 % more
 inertia, and all at 40 %."""
-_LISTED = 8  # runs whose values are all told
 
 
-@dataclass(frozen=True)
-class RunInertia:
-    """The inertia of a run by the name of the run, and its standard error, kg m2."""
-
-    name: str
-    value: float
-    error: float
-
-
-def different_inertias(evidence: Evidence, model: Model) -> list[RunInertia]:
-    """Return the inertia of each run that clearly shows one; empty where it may be one of all.
-
-    Nothing is said of steady periods, which show too few lines; of slow motion, which shows no
-    inertia; of what swings free, which shows ratios to it; nor of an axis that yields.
+def different_inertias(evidence: Evidence, seen: Mapping[str, SeenInertia]) -> list[RunValue]:
+    """Return the inertia of each run that clearly shows one, kg m2; none where one may be of all.
 
     Args:
         evidence: the runs.
-        model: the best model.
+        seen: what each run shows, from `seen_by_run`.
     """
-    records = evidence.records
-    yields = not model.rigid or f"{YIELDS}.compliance_rad_nm" in model.effects
-    if evidence.slow or records.swings_free or isinstance(records, SteadyRuns) or yields:
-        return []
-    found, seen = [], []
-    for index, record in enumerate(records.records):
-        parts = [p for p, part in enumerate(evidence.parts) if part.record == index]
-        own = SeenTorques(evidence, parts, model).inertia(not records.linear) if parts else None
-        if own is not None and own.value > 0.0 and own.share >= _SHARE:
-            found.append(RunInertia(record.name, own.value, own.error))
-            seen.append(own)
+    shown = {n: own for n, own in seen.items() if own.value > 0.0 and own.share >= _SHARE}
+    found = [RunValue(name, own.value, own.error) for name, own in shown.items()]
     if len(found) < 2 or not _apart(found):
         return []
+    records = evidence.records
     shortest_s = min(r.samples for r in records.records) / records.sample_rate_hz
     tried = masses(shortest_s, evidence.simulator.crossover_hz)
-    return found if tried and _worse_as_one(seen, tried) else []
+    return found if tried and _worse_as_one(list(shown.values()), tried) else []
 
 
-def _apart(found: Sequence[RunInertia]) -> bool:
+def _apart(found: Sequence[RunValue]) -> bool:
     """Tell whether the least and the greatest differ beyond their errors, and enough to matter."""
-    least, most = _ends(found)
+    least, most = ends(found)
     errors = [np.hypot(run.error, _LAW * run.value) for run in (least, most)]
-    needed = max(_DIFFERS * most.value, _ERRORS * float(np.hypot(*errors)))
+    needed = max(_DIFFERS * most.value, ERRORS * float(np.hypot(*errors)))
     return most.value - least.value > needed
-
-
-def _ends(found: Sequence[RunInertia]) -> tuple[RunInertia, RunInertia]:
-    """Return the runs of the least and of the greatest inertia."""
-    ordered = sorted(found, key=lambda run: run.value)
-    return ordered[0], ordered[-1]
 
 
 def _worse_as_one(seen: Sequence[SeenInertia], tried: Sequence[tuple[float, float]]) -> bool:
@@ -98,7 +66,7 @@ def _left(products: np.ndarray) -> float:
     return float(products[2, 2] - products[:2, 2] @ sizes)
 
 
-def inertias_differ(found: Sequence[RunInertia], linear: bool) -> str:
+def inertias_differ(found: Sequence[RunValue], linear: bool) -> str:
     """Return what to say of runs of different inertia.
 
     Args:
@@ -106,7 +74,7 @@ def inertias_differ(found: Sequence[RunInertia], linear: bool) -> str:
         linear: whether the axis is linear, its inertia a mass.
     """
     unit, what = ("kg", "mass") if linear else ("kg m2", "inertia")
-    told = found if len(found) <= _LISTED else _ends(found)
+    told = found if len(found) <= LISTED else ends(found)
     each = ", ".join(f"{run.value:.3g} in {run.name}" for run in told)
     only = "" if told is found else f"; the least and the greatest of {len(found)} runs"
     return (

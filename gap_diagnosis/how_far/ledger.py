@@ -9,15 +9,13 @@ import numpy as np
 
 from ..model.evidence import Evidence
 from ..model.rig_model import Model
-from ..outcome.cause import Place
+from ..outcome.cause import MOST_SHARE, Place
 from ..outcome.diagnosis import Remainder, Stage, Step
 from ..outcome.gap_size import Figure, Gap, StageFigures
 from ..where.remainder import looks_like
 from .bootstrap import Choice, ratio, stage_figures
 
 _MOST_PLACES = 4
-RUNS_AWAY = 10.0
-"""Times the squared gap of the refit: how far a model runs away beyond that says nothing."""
 
 
 class Ledger:
@@ -171,13 +169,11 @@ class Ledger:
         return self.places(np.sqrt(squares / self.evidence.floor(self.parts)))
 
     def share(self, without: Model, best: Model, refit: Model) -> Figure:
-        """Return how much of what the refit left comes back without a cause, with its interval.
-
-        A model that runs away without it counts as `RUNS_AWAY` times that.
-        """
-        gap = self.squares(refit)
-        lost = np.minimum(self.squares(without), RUNS_AWAY * gap.mean()) - self.squares(best)
-        return ratio(lost, gap, Choice.among(range(gap.size), np.zeros(gap.size)))
+        """Return how much of what the refit left comes back without a cause, with its interval."""
+        lost, gap = self.squares(without) - self.squares(best), self.squares(refit)
+        found = ratio(lost, gap, Choice.among(range(gap.size), np.zeros(gap.size)))
+        ends = found.model_dump().items()
+        return Figure(**{k: None if v is None else min(v, MOST_SHARE) for k, v in ends})
 
     def remainder(self, best: Model, refit: Model) -> Remainder:
         """Return what a model leaves, and what that looks like."""

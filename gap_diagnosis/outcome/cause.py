@@ -30,6 +30,10 @@ class Place(ResultModel):
     sigma: Number
 
 
+MOST_SHARE = 10.0
+"""How far a model runs away without a cause says nothing: its share counts as that at the most."""
+
+
 class Cause(ResultModel):
     """An unmodelled effect that is present.
 
@@ -38,7 +42,7 @@ class Cause(ResultModel):
         others: effects that these data cannot tell from it.
         present: probability that it, or one of the others, is there.
         share: how much of the squared gap that the refit left comes back if the cause is left out
-            and all else is fitted anew; at most about ten, where the model then runs away.
+            and all else is fitted anew; at most `MOST_SHARE`, where the model then runs away.
         invariance_p: how often chance alone makes its sizes differ so much between levels; None
             where there is one level only.
         where: where leaving it out shows most.

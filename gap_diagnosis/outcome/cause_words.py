@@ -9,7 +9,7 @@ from fjr_interface.linear_axis import pitch_m
 from fjr_kit.number_text import unsigned_zero
 from fjr_sim_node import effects as fx
 
-from .cause import Cause, Place
+from .cause import MOST_SHARE, Cause, Place
 from .diagnosis import Diagnosis, EvidenceKind
 from .gap_size import Estimate, Figure
 from .verdict_words import explanation
@@ -40,8 +40,6 @@ TORQUE = (
 )
 LEAST_PERCENT = 1e-3
 """A smaller share is shown as less than that: its digits mean nothing to a reader."""
-MOST_SHARE = 9.0
-"""A greater one is that of a model which runs away without the cause."""
 NO_SHARE = "none seen"
 """What stands for a share that may be zero or less."""
 _MOST_DIGITS = 6
@@ -172,12 +170,12 @@ def share_words(figure: Figure | None) -> str:
     """Return a share with its interval, in percent; a dash where there is none.
 
     A share that does not differ from nothing is said to be none, and one of a model that runs away
-    without the cause to be more than it can be told: their digits mean nothing.
+    without the cause has an end: their digits mean nothing.
     """
     if figure is None or not known(figure.value):
         return "-"
-    if figure.value > MOST_SHARE:
-        return f"over {percent(MOST_SHARE)}"
+    if figure.value >= MOST_SHARE:
+        return f"{percent(MOST_SHARE)} or more"
     if not closes(figure):
         return NO_SHARE
     if figure.low is None or figure.high is None:

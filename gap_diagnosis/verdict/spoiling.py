@@ -41,7 +41,7 @@ def spoils(effects: Sequence[str]) -> str:
     """Return the note on causes that were taken away since they spoil what no fit has seen."""
     what = " and ".join(explanation([effect]) for effect in effects)
     return (
-        f"With {what} the model errs more than twice as much in runs that no fit has seen as "
+        f"With {what} the model errs more than twice as much on data that no fit has seen as "
         "without, so this is not named: runs may differ by something else, such as the loop, the "
         "load or what is switched on. Diagnose alike ones apart."
     )

@@ -28,7 +28,7 @@ from gap_diagnosis.outcome.gap_size import Figure, Gaps
         ((-0.0017, -0.0025, -0.00084), NO_SHARE),
         ((0.01, -0.02, 0.04), NO_SHARE),
         ((-0.01, None, None), NO_SHARE),
-        ((9.99, 9.8, 10.0), "over 900%"),
+        ((10.0, 9.8, 10.0), "1000% or more"),
     ],
 )
 def test_a_share_and_both_its_ends_have_the_digits_they_need(ends, words):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -13,11 +14,13 @@ from fjr_records.records import Record, RecordSet
 from fjr_sim_node.simulation.closed_loop import simulate
 from gap_diagnosis.any_record import investigate
 from gap_diagnosis.fits.cell_fits import CellFitter
-from gap_diagnosis.gates.run_inertias import RunInertia, different_inertias, inertias_differ
+from gap_diagnosis.gates.by_run import RunValue, seen_by_run
+from gap_diagnosis.gates.run_inertias import different_inertias, inertias_differ
 from gap_diagnosis.gates.run_loads import RunLoad, different_loads, loads_differ
 from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.model.nominal import datasheet
 from gap_diagnosis.model.rig_model import Model
+from gap_diagnosis.starts.seen_inertia import SeenInertia
 
 RATE, SECONDS, RIGS = 200.0, 10.0, 30
 FRICTIONS = ("coulomb_friction", "viscous_friction")
@@ -104,12 +107,18 @@ def fitted(runs: RecordSet, seed: int, frictions: bool) -> tuple[Evidence, Model
     return fitter.evidence, fit.model
 
 
-def told(runs: RecordSet, seed: int, frictions: bool) -> list[RunInertia]:
+def seen(runs: RecordSet, seed: int, frictions: bool) -> tuple[Evidence, Mapping[str, SeenInertia]]:
+    """Return the evidence, and what each run shows beside such a fit."""
+    evidence, model = fitted(runs, seed, frictions)
+    return evidence, seen_by_run(evidence, model)
+
+
+def told(runs: RecordSet, seed: int, frictions: bool) -> list[RunValue]:
     """Return the different inertias beside such a fit, over that of the rig."""
     total = 10.0 ** np.random.default_rng(seed).uniform(-3.0, 0.0)
     return [
-        RunInertia(run.name, run.value / total, run.error / total)
-        for run in different_inertias(*fitted(runs, seed, frictions))
+        RunValue(run.name, run.value / total, run.error / total)
+        for run in different_inertias(*seen(runs, seed, frictions))
     ]
 
 
@@ -117,9 +126,10 @@ def test_friction_that_scatters_is_never_told_as_inertia_or_load():
     alarms = []
     for seed in range(RIGS):
         evidence, model = fitted(recorded(seed, (1.0,) * 4), seed, bool(seed % 2))
-        alarms += different_inertias(evidence, model) + different_loads(evidence, model)
+        shown = seen_by_run(evidence, model)
+        alarms += different_inertias(evidence, shown) + different_loads(evidence, shown)
         evidence.records = as_linear(evidence.records)
-        alarms += different_loads(evidence, model)
+        alarms += different_loads(evidence, seen_by_run(evidence, model))
     assert alarms == []
 
 
@@ -128,8 +138,8 @@ def test_a_load_in_half_of_the_runs_is_told_with_its_value():
     missed = 0
     for seed in range(10):
         runs = recorded(seed, (1.0,) * 4, loads=(0.0, 0.2, 0.0, 0.2))
-        assert different_loads(*fitted(runs, seed, bool(seed % 2))) == []
-        found = different_loads(*fitted(as_linear(runs), seed, bool(seed % 2)))
+        assert different_loads(*seen(runs, seed, bool(seed % 2))) == []
+        found = different_loads(*seen(as_linear(runs), seed, bool(seed % 2)))
         rng = np.random.default_rng(seed)
         usual = 10.0 ** rng.uniform(-3.0, 0.0) * rng.uniform(0.1, 0.6) * 150.0
         missed += not found
@@ -150,8 +160,8 @@ def test_a_payload_in_half_of_the_runs_is_told_with_its_values():
 def test_a_load_on_a_spring_is_not_told_as_another_inertia_in_each_run(hz):
     """It is of another inertia at each frequency, and the runs are of different bands."""
     for seed in range(6):
-        evidence, model = fitted(recorded(seed, (1.0,) * 4, hz), seed, frictions=True)
-        assert different_inertias(evidence, model) == different_loads(evidence, model) == []
+        evidence, shown = seen(recorded(seed, (1.0,) * 4, hz), seed, frictions=True)
+        assert different_inertias(evidence, shown) == different_loads(evidence, shown) == []
 
 
 def test_the_sentence_names_runs_and_stands_in_place_of_scatter():
@@ -166,7 +176,7 @@ def test_the_sentence_names_runs_and_stands_in_place_of_scatter():
 
 
 def test_of_many_runs_the_least_and_the_greatest_are_told():
-    found = [RunInertia(f"run_{k}", 1.0 + 0.1 * k, 0.001) for k in range(12)]
+    found = [RunValue(f"run_{k}", 1.0 + 0.1 * k, 0.001) for k in range(12)]
     note = inertias_differ(found, linear=True)
     assert "mass" in note and "kg," in note and "kg m2" not in note
     assert "1 in run_0, 2.1 in run_11" in note and "of 12 runs" in note
