@@ -241,29 +241,6 @@ class Evidence:
         pieces = [lines[self.parts[i].record][self.parts[i].windows].ravel() for i in which]
         return np.concatenate(pieces)
 
-    def changes(
-        self, positions: dict[int, np.ndarray], which: Sequence[int], every: int = 1
-    ) -> np.ndarray:
-        """Return the lines of changes of y on parts, (..., errors); zeros for those of the twist.
-
-        Args:
-            positions: by the index of the record, the changes, means of each `every` samples,
-                (..., samples // every).
-            which: indices of parts.
-            every: a divisor of half the hop.
-        """
-        hop, scale = self.hop // every, np.sqrt(every)  # the transform is orthonormal
-        parts = [self.parts[i] for i in which]
-        spans = spans_of(parts)
-        lines = {
-            index: scale
-            * lapped(positions[index][..., samples_of(span, hop)], hop)[..., : self.lines]
-            for index, span in spans.items()
-        }
-        if self.twist is not None:
-            lines = {i: np.concatenate([own, 0.0 * own], axis=-1) for i, own in lines.items()}
-        return joined(lines, spans, parts)
-
     def cell_of(self, which: Sequence[int]) -> np.ndarray:
         """Return the cell of each error on parts, int (errors,)."""
         return np.concatenate(

@@ -46,3 +46,24 @@ def lapped(signal: np.ndarray, hop: int) -> np.ndarray:
     c, d = second[..., :half], second[..., half:]
     folded = np.concatenate([-c[..., ::-1] - d, a - b[..., ::-1]], axis=-1)
     return dct(folded, type=4, norm="ortho", axis=-1)
+
+
+def unlapped(lines: np.ndarray, hop: int) -> np.ndarray:
+    """Return the transposed transform, which undoes `lapped` where two windows overlap.
+
+    Args:
+        lines: float64 (..., windows, N).
+        hop: N, even.
+
+    Returns:
+        float64 (..., (windows + 1) N); zeros without windows.
+    """
+    folded = dct(lines, type=4, norm="ortho", axis=-1)
+    half = hop // 2
+    ahead, behind = folded[..., half:], -folded[..., :half]
+    rise = np.sin(np.pi / (2 * hop) * (np.arange(hop) + 0.5))
+    first = np.concatenate([ahead, -ahead[..., ::-1]], axis=-1) * rise
+    second = np.concatenate([behind[..., ::-1], behind], axis=-1) * rise[::-1]
+    none = np.zeros((*lines.shape[:-2], 1, hop))
+    pieces = np.concatenate([first, none], axis=-2) + np.concatenate([none, second], axis=-2)
+    return pieces.reshape(*lines.shape[:-2], -1)

@@ -1,8 +1,9 @@
 """Ripples over the motor angle that could explain what a fit leaves of records.
 
 A ripple acts as a torque along the model's own motion. What it does to the position is predicted
-linearly, by the response of plant and controller (or observer), G/(1 + G C_y); so hundreds of
-numbers of ripples can be tried at once, and only the best are simulated. The torque is made at each
+linearly, by the response of plant and controller (or observer), G/(1 + G C_y); back through that
+response goes what the fit leaves, and pulls at each of hundreds of numbers of ripples. Those that
+it pulls at most are calculated, and only the best are simulated. The torque is made at each
 sample and then averaged over as many as the lines of the evidence allow. Along a steady period it
 is periodic as the motion is; along any other record the response is that from rest.
 """
@@ -12,6 +13,7 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 
 import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
@@ -22,9 +24,12 @@ from fjr_sim_node.theory.linear import g0
 
 from ..model.evidence import Evidence
 from ..model.rig_model import Model
+from ..model.small_changes import changes, pulls
 from ..model.steady_runs import SteadyRuns
 
-MOST_TRIED = 240
+_ALL = 120  # numbers of ripples of which each is calculated
+_SOME = 60  # of more than that, calculated wherever they lie, and as many that promise most
+_TINY = 1e-30
 _LEAST_FIRST = 0.1  # of the second harmonic: a smaller first one is no ripple of that number
 _FREE_HZ = 1e-3  # below, a free body has no response
 _LEAST_RATE = 8  # samples in a period of the highest line: averaging takes off 3 % there
@@ -77,10 +82,10 @@ class Ripples:
 
         Args:
             effect: identifier of an effect that is periodic in the motor angle.
-            tried: numbers to try, ascending; thinned out to `MOST_TRIED`.
+            tried: numbers to try, ascending.
             most: how many to return, each a maximum of its own.
         """
-        tried = _thinned(tried)
+        tried = self._likely(effect, tried, 1)
         gains = np.array([self._fitted(effect, (float(cycles),))[1] for cycles in tried])
         return [float(tried[i]) for i in _peaks(gains)[:most]]
 
@@ -89,13 +94,13 @@ class Ripples:
 
         Args:
             effect: identifier of an effect that is periodic in the motor angle.
-            tried: numbers to try, ascending; thinned out to `MOST_TRIED`.
+            tried: numbers to try, ascending.
             most: how many to return, each a maximum of its own.
 
         Returns:
             values by the names of the effect's parameters.
         """
-        tried = _thinned(tried)
+        tried = self._likely(effect, tried, 2)
         fits = [self._fitted(effect, (float(c), 2.0 * float(c))) for c in tried]
         names = fx.EFFECTS[effect].names
         found = []
@@ -116,11 +121,54 @@ class Ripples:
                 index: self._moved(k, self._torques(effect, k, number))
                 for k, index in enumerate(self._runs)
             }
-            changes = self._evidence.changes(moved, self._parts, self._every)
-            own.append(self._beyond(changes * self._weight))
+            moves = changes(self._evidence, moved, self._parts, self._every)
+            own.append(self._beyond(moves * self._weight))
         columns = np.concatenate(own)
         sizes = np.linalg.lstsq(columns.T, -self._left, rcond=1e-6)[0]
         return sizes, -float(sizes @ (columns @ self._left))
+
+    def _likely(self, effect: str, tried: np.ndarray, harmonics: int) -> np.ndarray:
+        """Return the numbers of cycles that are worth a calculation of their own, ascending.
+
+        A ripple gains the square of what pulls at it by what it meets. The pull costs little for
+        each number; what it meets goes evenly from number to number, and is calculated for some.
+
+        Args:
+            effect: identifier of an effect that is periodic in the motor angle.
+            tried: numbers to try, ascending.
+            harmonics: of a ripple, which count together.
+        """
+        if len(tried) <= _ALL:
+            return tried
+        some = tried[np.linspace(0, len(tried) - 1, _SOME).astype(int)]
+        met = [self._pull(effect, c) / max(self._fitted(effect, (c,))[1], _TINY) for c in some]
+        gains = np.zeros(len(tried))
+        for harmonic in range(1, harmonics + 1):
+            pull = np.array([self._pull(effect, harmonic * c) for c in tried])
+            gains += pull / np.exp(np.interp(harmonic * tried, some, np.log(met)))
+        return np.union1d(some, tried[_peaks(gains)[: _ALL - _SOME]])
+
+    def _pull(self, effect: str, cycles: float) -> float:
+        """Return the square of what pulls at sine and cosine of a number of cycles."""
+        total = np.zeros(2)
+        for k, pull in enumerate(self._pulls):
+            samples = pull.shape[1]
+            torques = self._torques(effect, k, cycles)[:, :samples].reshape(-1, 2, samples)
+            total += np.einsum("fnt,ft->n", torques, pull[: len(torques)])
+        return float(total @ total) + _TINY
+
+    @cached_property
+    def _pulls(self) -> list[np.ndarray]:
+        """What pulls at a torque on the motor, and between link and motor, at each time, (2, N)."""
+        found = []
+        of_runs = pulls(self._evidence, self._left * self._weight, self._parts, self._every)
+        for k, index in enumerate(self._runs):
+            pull = of_runs[index][self._run_in // self._every :]
+            size = self._size(k, pull.size)
+            spectra = self._responses[k].conj() * rfft(pull, size)
+            blocks = irfft(spectra, size)[:, : pull.size] / self._every
+            found.append(np.repeat(blocks, self._every, axis=1).astype(np.float32))
+        return found
 
     def _torques(self, effect: str, k: int, cycles: float) -> np.ndarray:
         """Return the torques by ripples of size 1 along the motion.
@@ -181,12 +229,6 @@ class Ripples:
     def _beyond(self, errors: np.ndarray) -> np.ndarray:
         """Return what the parent's parameters can't follow of errors, (..., errors)."""
         return errors - (errors @ self._basis) @ self._basis.T
-
-
-def _thinned(tried: np.ndarray) -> np.ndarray:
-    if len(tried) <= MOST_TRIED:
-        return tried
-    return tried[np.unique(np.linspace(0, len(tried) - 1, MOST_TRIED).astype(int))]
 
 
 def _peaks(gains: np.ndarray) -> np.ndarray:

@@ -34,26 +34,31 @@ BIAS = {"torque_bias.torque_nm": 1.5}
 SCATTER = dict.fromkeys(GROUPS["friction"], unseen_friction.SCATTER)
 
 
-def reference(seed: int, samples: int, rms_rad: float) -> np.ndarray:
+def reference(
+    seed: int, samples: int, rms_rad: float, band_hz: tuple[float, float] = (0.3, 15.0)
+) -> np.ndarray:
     rng = np.random.default_rng(seed)
     lines = np.fft.rfftfreq(samples, 1.0 / RATE)
-    spectrum = np.where((lines > 0.3) & (lines < 15.0), 1.0, 0.0) * np.exp(
+    spectrum = np.where((lines > band_hz[0]) & (lines < band_hz[1]), 1.0, 0.0) * np.exp(
         2j * np.pi * rng.uniform(size=lines.size)
     )
     signal = np.fft.irfft(spectrum, samples)
     return rms_rad * signal / signal.std() * np.minimum(1.0, np.arange(samples) / 100.0)
 
 
-def records(effects=None, *, runs=1, seconds=8.0, known=True, scatter=0.0, seed=5) -> RecordSet:
+def records(
+    effects=None, *, runs=1, seconds=8.0, known=True, scatter=0.0, seed=5,
+    rms_rad=(0.02, 0.06), band_hz=(0.3, 15.0),
+) -> RecordSet:  # fmt: skip
     """Return runs of the paper's rig at two levels; friction may scatter from run to run."""
     made, samples = [], int(seconds * RATE)
     rng = np.random.default_rng(seed)
-    for level, rms in enumerate((0.02, 0.06)):
+    for level, rms in enumerate(rms_rad):
         for run in range(runs):
             factor = float(np.exp(scatter * rng.standard_normal()))
             plant = {**NOMINAL, "fs": factor * NOMINAL["fs"], "fsm": factor * NOMINAL["fsm"]}
             signals = simulate(
-                reference(10 * level + run, samples, rms),
+                reference(10 * level + run, samples, rms, band_hz),
                 RATE,
                 coefficients(plant),
                 pd_filtered.coefficients(LAW),

@@ -7,7 +7,9 @@ import pytest
 from test_evidence import NOMINAL, RATE, records
 
 from gap_diagnosis.fits.cell_fits import CellFitter
+from gap_diagnosis.model import small_changes
 from gap_diagnosis.model.evidence import Evidence
+from gap_diagnosis.model.small_changes import changes
 from gap_diagnosis.starts.ripples import _averaged
 from gap_diagnosis.which.stepwise import Stepwise
 
@@ -61,6 +63,50 @@ def test_a_ripple_of_one_harmonic_gets_no_second():
     assert "cogging.second_ratio" not in found.best.model.effects
 
 
+def test_a_ripple_finer_than_the_motion_is_long_is_proposed_wherever_it_lies():
+    """A gear's ratio, counted at its joint: more numbers are possible than can be calculated."""
+    truth = {
+        "cogging.amplitude_nm": 4.0,
+        "cogging.cycles_per_turn": 131.0,
+        "cogging.phase_rad": 0.7,
+    }
+    slow = records(truth, seconds=16.0, rms_rad=(1.5, 3.0), band_hz=(0.05, 0.3))
+    fitter = CellFitter(Evidence(slow, NOMINAL), NOMINAL, 0.1)
+    tried = fitter.scales.cycles()
+    assert len(tried) > 400
+    proposed = fitter._ripples(fitter.refit())[0].cycles("cogging", tried, 4)
+    assert min(abs(np.array(proposed) - 131.0)) < 0.1
+
+
+@pytest.mark.parametrize("effect", CASES)
+def test_what_pulls_at_a_ripple_tells_what_it_gains(effect):
+    truth, _ = CASES[effect]
+    named = {f"{effect}.{name}": value for name, value in truth.items()}
+    fitter = CellFitter(Evidence(records(named, runs=2), NOMINAL), NOMINAL, 0.1)
+    ripples = fitter._ripples(fitter.refit())[0]
+    tried = np.linspace(20.0, 80.0, 31)
+    gains = np.array([ripples._fitted(effect, (c,))[1] for c in tried])
+    pulls = np.array([ripples._pull(effect, c) for c in tried])
+    met = np.interp(tried, tried[::5], (pulls / gains)[::5])
+    assert pulls / met == pytest.approx(gains, rel=0.1)
+
+
+@pytest.mark.parametrize("every", [1, 2])
+def test_pulls_are_transposed_changes(every):
+    evidence = Evidence(records(seconds=32.0), NOMINAL)
+    evidence.lines = evidence.hop // (4 * every)
+    parts = evidence.parts_for("fit")
+    rng = np.random.default_rng(every)
+    moved = {
+        index: rng.standard_normal(record.samples // every)
+        for index, record in enumerate(evidence.records.records)
+    }
+    lines = changes(evidence, moved, parts, every)
+    errors = rng.standard_normal(lines.size)
+    found = small_changes.pulls(evidence, errors, parts, every)
+    assert sum(own @ moved[index] for index, own in found.items()) == pytest.approx(errors @ lines)
+
+
 @pytest.mark.parametrize("every", [2, 4])
 def test_averaged_changes_have_the_lines_of_the_changes(every):
     evidence = Evidence(records(seconds=32.0), NOMINAL)
@@ -73,11 +119,11 @@ def test_averaged_changes_have_the_lines_of_the_changes(every):
     spectrum[np.fft.rfftfreq(samples, 1.0 / RATE) > highest] = 0.0
     change = np.fft.irfft(spectrum, samples)
     parts = [i for i, part in enumerate(evidence.parts) if part.record == 0]
-    full = evidence.changes({0: change}, parts)
+    full = changes(evidence, {0: change}, parts)
     blocks = change[: samples // every * every].reshape(-1, every).mean(axis=1)
-    averaged = evidence.changes({0: blocks}, parts, every)
+    averaged = changes(evidence, {0: blocks}, parts, every)
     assert np.abs(averaged - full).max() < 0.04 * np.abs(full).max()
-    both = evidence.changes({0: np.array([change, -2.0 * change])}, parts)
+    both = changes(evidence, {0: np.array([change, -2.0 * change])}, parts)
     assert np.allclose(both, [full, -2.0 * full], rtol=0.0, atol=1e-12 * np.abs(full).max())
 
 
