@@ -103,8 +103,9 @@ class ExcitationNode(runtime.RigNode):
     def _on_pace(self, message: bytes) -> None:
         seconds, nanoseconds = _TIME.unpack_from(message)
         passed_ns = seconds * 1_000_000_000 + nanoseconds
-        # A time beyond what was sent is an earlier realization's, and no pace for this one.
-        if self._passed_ns < passed_ns <= self._sent_ns:
+        # The sample after what was sent may be under way: of ticks the newest alone is sure to come.
+        # A time beyond that is an earlier realization's, and no pace for this one.
+        if self._passed_ns < passed_ns <= max(self._sent_ns, self._unsent_ns):
             self._passed_ns = passed_ns
             if self.due_ns == NEVER and self._next_ns <= passed_ns:
                 self.on_time(time.monotonic_ns())
@@ -177,6 +178,11 @@ class ExcitationNode(runtime.RigNode):
 
     def _unready(self) -> Lack | None:
         return self._untaken_by() or (None if self.due_ns == NEVER else Lack("the first window"))
+
+    @property
+    def _unsent_ns(self) -> int:
+        """Stamp of the first sample that is not sent (ns); 0 if all are."""
+        return int(self._stamps[self._sent]) if self._sent < self._stamps.size else 0
 
     @property
     def _over(self) -> bool:

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from by_hand import (
     REAL_TIME,
+    SIMULATOR_NODE,
     by_hand,
     described,
     fjr,
@@ -79,10 +80,10 @@ def test_an_emergency_stop_holds_zero_torque_until_it_is_released(start, rig):
 
     heard = rig.peer.listen(DiagnosticArray, "/diagnostics", 100)
     nodes = by_hand(start, periods=500, pace="clock")
-    nodes["s"](), nodes["e"]()
+    start.node(SIMULATOR_NODE, speed=1.0), nodes["e"]()
     controller = nodes["c"]()
     rig.peer.spin_until(lambda: len(rig.torque) > 100, "torques")
-    # Asked while listening: a subscription keeps the latest 2000 torques only, half a second.
+    # Asked while listening: a subscription keeps the latest 2000 torques only, two seconds.
     stopped = rig.peer.call(Trigger, "controller/estop", Trigger.Request())
     assert "zero torque until released" in stopped.message
     rig.peer.spin_until(lambda: rig.torque[-1].effort[0] == 0.0, "zero torque")

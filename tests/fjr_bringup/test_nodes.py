@@ -79,6 +79,29 @@ def test_what_a_run_publishes_beside_the_signals(start, rig):
     assert Experiment.from_json(late[0].data, "topic") == described()
 
 
+def test_a_stream_goes_on_by_the_newest_tick_alone(start, rig):
+    """An excitation that got no processor for long hears of no other tick than the last one.
+
+    The simulator has then begun the sample after the last one that has a reference.
+    """
+    from rosgraph_msgs.msg import Clock
+    from std_msgs.msg import String
+
+    from fjr_interface.ros import runtime
+
+    rig.peer.listen(String, "experiment", runtime.EXPERIMENT_QOS)
+    reference = rig.peer.listen(rig.kind, "reference", rig.qos)
+    ticks = rig.peer.node.create_publisher(Clock, "/clock", runtime.CLOCK_QOS)
+    more = {"describe_controller": False, "periods": 3}
+    start.node(EXCITATION_NODE, readers="peer", **EXCITATION, **more)
+    rig.peer.spin_until(lambda: len(reference) == 1000, "the first window")
+    own = 1  # reader of the clock
+    rig.peer.spin_until(lambda: ticks.get_subscription_count() > own, "its reader of the clock")
+    due = int(described(periods=3).stamps_ns[1000])
+    ticks.publish(topics.clock_message(due))
+    rig.peer.spin_until(lambda: len(reference) == 2000, "the next window")
+
+
 def test_start_mid_run_replaces_the_run(start, rig):
     from rcl_interfaces.msg import Parameter, ParameterValue
     from rcl_interfaces.srv import SetParameters
