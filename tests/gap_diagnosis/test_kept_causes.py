@@ -58,6 +58,13 @@ def searched():
     return fitter, fits
 
 
+@pytest.fixture(scope="module")
+def tested(searched):
+    """Return the tested causes of the last of these fits."""
+    fitter, fits = searched
+    return tuple(causes_with_tests(fitter, fits[3], fits[0], SCATTER))
+
+
 def test_what_is_left_after_a_first_cause_was_taken_out_is_shown_cause_after_cause(searched):
     fitter, fits = searched
     found, tested = kept(fitter, Found(fits), SCATTER, lambda _: None, fits[-1].effects)
@@ -71,9 +78,8 @@ def test_what_is_left_after_a_first_cause_was_taken_out_is_shown_cause_after_cau
     assert both["delay.time_s"] == pytest.approx(1e-3, rel=0.05)
 
 
-def test_steps_end_at_the_fit_itself(searched):
+def test_steps_end_at_the_fit_itself(searched, tested):
     fitter, fits = searched
-    tested = causes_with_tests(fitter, fits[3], fits[0], SCATTER)
     steps = _one_by_one(fitter, fits[3], tested)
     assert [len(fit.effects) for fit in steps] == [1, 2, 3]
     assert steps[-1].model is fits[3].model
@@ -109,9 +115,7 @@ def test_what_promises_less_is_fitted_where_much_of_the_motion_is_missed(
     assert len(batches) == (2 if more else 1)
 
 
-def test_why_a_cause_that_closes_much_is_not_named_is_said(searched):
-    fitter, fits = searched
-    tested = causes_with_tests(fitter, fits[3], fits[0], SCATTER)
+def test_why_a_cause_that_closes_much_is_not_named_is_said(tested):
     greatest = max(tested, key=lambda t: t.share.value)
     assert greatest.share.value > 0.5 and _changing(greatest) == []
     (said,) = _changing(replace(greatest, invariance_p=1e-4, own_sizes=0.1))
@@ -122,9 +126,7 @@ def test_why_a_cause_that_closes_much_is_not_named_is_said(searched):
     assert replace(greatest, invariance_p=1e-4, own_sizes=0.005).invariant
 
 
-def test_a_third_cause_must_be_sure(searched):
-    fitter, fits = searched
-    tested = causes_with_tests(fitter, fits[3], fits[0], SCATTER)
+def test_a_third_cause_must_be_sure(tested):
     gains = [Gain(mean, mean, 1.0, 1e-4) for mean in (30.0, 20.0, 10.0)]
     sure = [replace(t, gain=g, in_band=0.99) for t, g in zip(tested, gains, strict=True)]
     guess = replace(sure[2], in_band=0.5, over_noise_closed=0.5, share=replace_share(sure[2].share))
@@ -156,10 +158,9 @@ def test_several_sizes_are_known_together_where_none_is_alone(fall, there):
     [(0.2, 0.9, 1.0), (0.9, 0.2, 1.0), (0.4, 0.9, 0.8), (0.9, 0.6, 0.6), (0.6, math.nan, 0.6)],
 )
 def test_a_cause_is_doubtful_where_most_of_the_error_is_left_however_it_is_counted(
-    searched, motion, over_noise, share
+    tested, motion, over_noise, share
 ):
-    fitter, fits = searched
-    sure = max(causes_with_tests(fitter, fits[3], fits[0], SCATTER), key=lambda t: t.present)
+    sure = max(tested, key=lambda t: t.present)
     assert sure.left < 0.1 and sure.over_noise < 0.1
     closes = replace(
         sure, share=sure.share.model_copy(update={"value": 0.5}), left=0.0, over_noise=0.0
@@ -168,9 +169,8 @@ def test_a_cause_is_doubtful_where_most_of_the_error_is_left_however_it_is_count
     assert beside.present == pytest.approx(share * closes.present, rel=0.02)
 
 
-def test_the_nearest_kin_of_what_no_effect_explains_is_told_in_a_note(searched):
-    fitter, fits = searched
-    sure = max(causes_with_tests(fitter, fits[3], fits[0], SCATTER), key=lambda t: t.present)
+def test_the_nearest_kin_of_what_no_effect_explains_is_told_in_a_note(tested):
+    sure = max(tested, key=lambda t: t.present)
     assert not sure.nearest_kin and _kin(sure) == []
     share = sure.share.model_copy(update={"value": 0.6, "low": 0.5})
     doubted = replace(
@@ -195,10 +195,9 @@ def test_the_nearest_kin_of_what_no_effect_explains_is_told_in_a_note(searched):
     ],
 )
 def test_what_closes_little_and_leaves_as_much_may_be_what_another_law_leaves(
-    searched, share, left, beside, factor
+    tested, share, left, beside, factor
 ):
-    fitter, fits = searched
-    sure = max(causes_with_tests(fitter, fits[3], fits[0], SCATTER), key=lambda t: t.present)
+    sure = max(tested, key=lambda t: t.present)
     closes = replace(
         sure,
         in_band=0.9,
@@ -218,10 +217,9 @@ def test_what_closes_little_and_leaves_as_much_may_be_what_another_law_leaves(
     [(0.6, 0.99, True), (0.99, 0.6, True), (0.6, 0.6, False), (0.6, math.nan, False)],
 )
 def test_what_closes_most_of_what_is_left_counts_however_that_is_counted(
-    searched, in_band, over_noise, there
+    tested, in_band, over_noise, there
 ):
-    fitter, fits = searched
-    sure = max(causes_with_tests(fitter, fits[3], fits[0], SCATTER), key=lambda t: t.present)
+    sure = max(tested, key=lambda t: t.present)
     assert sure.over_noise_closed > 0.9
     one_part_decides = sure.share.model_copy(update={"value": 3e-4, "low": -1e-4, "high": 8e-4})
     closes = replace(
@@ -232,7 +230,9 @@ def test_what_closes_most_of_what_is_left_counts_however_that_is_counted(
     assert (beside.present >= SURE) == (over_noise == 0.99)
 
 
-def test_of_near_equivalents_the_one_that_closes_little_beside_the_other_names_it_twice(searched):
+def test_of_near_equivalents_the_one_that_closes_little_beside_the_other_names_it_twice(
+    searched, tested
+):
     fitter, fits = searched
     best = fits[3]
     tested = causes_with_tests(fitter, best, fits[0], SCATTER)
@@ -253,10 +253,8 @@ def test_of_near_equivalents_the_one_that_closes_little_beside_the_other_names_i
 
 @pytest.mark.parametrize(("present", "bears"), [(0.99, True), (0.7, False)])
 def test_what_is_unsure_stays_if_without_it_a_cause_fails_that_is_sure_beside_it(
-    searched, present, bears
+    tested, present, bears
 ):
-    fitter, fits = searched
-    tested = causes_with_tests(fitter, fits[3], fits[0], SCATTER)
     sure = max(tested, key=lambda t: t.present)
     failed = replace(sure, certain=False)
     assert sure.passed and sure.present > 0.8 and not failed.passed
@@ -271,11 +269,11 @@ def test_what_is_unsure_stays_if_without_it_a_cause_fails_that_is_sure_beside_it
      (0.7, False, {"delay", "torque_bias"}), (0.2, True, set())],
 )  # fmt: skip
 def test_within_a_search_what_nearly_passes_stays_if_without_it_sure_causes_fail(
-    searched, monkeypatch, share, breaks, kept_causes
+    searched, tested, monkeypatch, share, breaks, kept_causes
 ):
     """A share of 0.7 of the ranks is little less than asked; one of 0.2 is a loss."""
     fitter, fits = searched
-    sure = max(causes_with_tests(fitter, fits[3], fits[0], SCATTER), key=lambda t: t.present)
+    sure = max(tested, key=lambda t: t.present)
     assert sure.passed and sure.present >= SURE
 
     def told(_fitter, fit, *_):
@@ -291,15 +289,14 @@ def test_within_a_search_what_nearly_passes_stays_if_without_it_sure_causes_fail
     monkeypatch.setattr(kept_causes_module, "causes_with_tests", told)
     monkeypatch.setattr(kept_causes_module, "_in_its_place", lambda *_: None)
     monkeypatch.setattr(kept_causes_module, "_twice", lambda *_: [])
-    found, tested = kept(fitter, Found(fits), SCATTER, lambda _: None, fits[-1].effects)
-    assert {t.effect for t in tested} == set(found.best.effects) == kept_causes
+    found, left = kept(fitter, Found(fits), SCATTER, lambda _: None, fits[-1].effects)
+    assert {t.effect for t in left} == set(found.best.effects) == kept_causes
     assert set(found.doubted) == set(fits[-1].effects) - kept_causes
     assert all(present <= LEAST_PRESENT for present in found.doubted.values())
 
 
-def test_what_nearly_passes_has_nothing_else_against_it(searched):
-    fitter, fits = searched
-    sure = max(causes_with_tests(fitter, fits[3], fits[0], SCATTER), key=lambda t: t.present)
+def test_what_nearly_passes_has_nothing_else_against_it(tested):
+    sure = max(tested, key=lambda t: t.present)
     seldom = replace(sure, gain=Gain(5.0, 4.0, 0.7, 0.01))
     assert not seldom.passed and seldom.nearly_passes
     for other in (
@@ -316,9 +313,9 @@ def _named(effects: tuple[str, ...], last: str) -> tuple[str, ...]:
     return tuple(last if effect == "dead_band" else effect for effect in effects)
 
 
-def test_what_takes_the_place_of_a_cause_must_pass_itself(searched, monkeypatch):
+def test_what_takes_the_place_of_a_cause_must_pass_itself(searched, tested, monkeypatch):
     fitter, fits = searched
-    sure = max(causes_with_tests(fitter, fits[3], fits[0], SCATTER), key=lambda t: t.present)
+    sure = max(tested, key=lambda t: t.present)
     last = fits[3].effects[-1]
     taken = replace(fits[3], effects=(*fits[3].effects[:-1], "dead_band"))
     tried = []
@@ -343,9 +340,8 @@ def test_what_takes_the_place_of_a_cause_must_pass_itself(searched, monkeypatch)
     assert set(found.best.effects) == set(fits[3].effects) - {last}
 
 
-def test_a_law_that_ends_at_a_limit_is_told_if_it_would_be_present_without_that(searched):
-    fitter, fits = searched
-    sure = max(causes_with_tests(fitter, fits[3], fits[0], SCATTER), key=lambda t: t.present)
+def test_a_law_that_ends_at_a_limit_is_told_if_it_would_be_present_without_that(tested):
+    sure = max(tested, key=lambda t: t.present)
     much = replace(sure, share=sure.share.model_copy(update={"value": 0.9, "low": 0.8}))
     ended = replace(much, bounded="hysteresis.displacement_rad", effect="hysteresis")
     assert not ended.passed and not _bent(much)
@@ -357,9 +353,9 @@ def test_a_law_that_ends_at_a_limit_is_told_if_it_would_be_present_without_that(
     assert not _bent(replace(ended, gain=replace(ended.gain, share=0.5)))
 
 
-def test_what_a_cause_closes_beside_what_others_do_in_its_band(searched):
+def test_what_a_cause_closes_beside_what_others_do_in_its_band(searched, tested):
     fitter, fits = searched
-    tested = {t.effect: t for t in causes_with_tests(fitter, fits[3], fits[0], SCATTER)}
+    tested = {t.effect: t for t in tested}
     ratio = tested["delay"].beside_others
     assert ratio > 0.0
     alone = tested["delay"].without
@@ -417,7 +413,7 @@ def test_a_cause_whose_shape_blurs_its_size_stays_where_sure_ones_fail_without_i
     assert (blurred in found.best.effects) is stays
 
 
-def test_friction_that_a_datasheet_lacks_stays_unless_something_is_against_it(searched):
+def test_friction_that_a_datasheet_lacks_stays_unless_something_is_against_it(searched, tested):
     fitter, fits = searched
     tested = causes_with_tests(fitter, fits[-1], fits[0], SCATTER)
     first = max(tested, key=lambda t: t.present)
@@ -454,11 +450,11 @@ def test_what_a_present_cause_modifies_is_as_present_and_lacked_friction_is_no_g
     assert [t.effect for t in _guesses(unsure, BOTH)] == ["cogging"]
 
 
-def test_what_passing_causes_modify_stays_where_the_datasheet_lacks_it(searched):
-    fitter, fits = searched
+def test_what_passing_causes_modify_stays_where_the_datasheet_lacks_it(searched, tested):
+    fitter, _ = searched
     bare = {**NOMINAL, "fs": 0.0, "fsm": 0.0}
     without = CellFitter(Evidence(records(runs=1, seconds=4.0), bare), bare, 0.1)
-    first, second, _ = causes_with_tests(fitter, fits[3], fits[0], SCATTER)
+    first, second, _ = tested
     base = replace(first, effect="coulomb_friction", certain=True, invariance_p=None)
     falls = replace(second, effect="stribeck_friction_motor", certain=True, gain=SURELY)
     falls = replace(falls, in_band=0.99, bounded=None, left=0.0, over_noise=0.0)
@@ -470,9 +466,8 @@ def test_what_passing_causes_modify_stays_where_the_datasheet_lacks_it(searched)
     assert _bases(fitter, [base, falls], names) == set()  # whose datasheet has friction
 
 
-def test_a_size_beyond_what_machines_have_is_doubted_and_this_is_said(searched):
-    fitter, fits = searched
-    sure = max(causes_with_tests(fitter, fits[3], fits[0], SCATTER), key=lambda t: t.present)
+def test_a_size_beyond_what_machines_have_is_doubted_and_this_is_said(tested):
+    sure = max(tested, key=lambda t: t.present)
     assert sure.unusual == 0.0 and replace(sure, unusual=1.0).present == sure.present
     assert replace(sure, unusual=3.0).present == pytest.approx(0.6 * sure.present, rel=0.02)
     eccentric = Model(NOMINAL, {"encoder_eccentricity.amplitude_rad": -0.27})
@@ -481,10 +476,10 @@ def test_a_size_beyond_what_machines_have_is_doubted_and_this_is_said(searched):
     assert over_usual(Model(NOMINAL, {"delay.time_s": 1.0}), "delay") == 0.0
 
 
-def test_what_others_needed_goes_when_they_no_longer_do(searched, monkeypatch):
+def test_what_others_needed_goes_when_they_no_longer_do(searched, tested, monkeypatch):
     """It stayed since a sure cause failed without it, and is nowhere to be seen after that went."""
     fitter, fits = searched
-    sure = max(causes_with_tests(fitter, fits[3], fits[0], SCATTER), key=lambda t: t.present)
+    sure = max(tested, key=lambda t: t.present)
     needless, bears, last = "stribeck_friction_motor", "delay", "torque_bias"
 
     def told(_fitter, fit, *_):
@@ -507,8 +502,8 @@ def test_what_others_needed_goes_when_they_no_longer_do(searched, monkeypatch):
         kept_causes_module, "_bears", lambda tested, _: any(t.effect == bears for t in tested)
         and tested[0].effect == needless and len(tested) == 3,
     )  # fmt: skip
-    found, tested = kept(fitter, Found(fits), SCATTER, lambda _: None, fits[-1].effects)
-    assert found.best.effects == (last,) == tuple(t.effect for t in tested)
+    found, left = kept(fitter, Found(fits), SCATTER, lambda _: None, fits[-1].effects)
+    assert found.best.effects == (last,) == tuple(t.effect for t in left)
 
 
 def test_causes_that_spoil_the_runs_which_report_are_taken_away(searched):
