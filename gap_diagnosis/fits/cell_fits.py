@@ -49,8 +49,9 @@ class CellFitter(ReweightedFits):
         self._rippled: tuple[CellFit, tuple[Ripples, SeenTorques]] | None = None
 
     def with_runs(self, records: RecordSet) -> CellFitter:
-        """Return what fits other runs by the same datasheet."""
-        evidence = Evidence(records, Model(self.nominal, {}).whole_plant)
+        """Return what fits the same runs with other torques or times, cut as these are."""
+        plant = Model(self.nominal, {}).whole_plant
+        evidence = Evidence(records, plant, parts=self.evidence.parts)
         return CellFitter(evidence, self.nominal, self.tolerance)
 
     def screening(self, parent: CellFit, effect: str) -> Screening:

@@ -23,7 +23,7 @@ from fjr_records.records import RecordSet
 from .held_motion import held_lines
 from .lapped import lapped, samples_of
 from .octaves import Octaves, lines_with_signal
-from .parts import Purpose, cut, hop_of, joined, spans_of
+from .parts import Part, Purpose, cut, hop_of, joined, spans_of
 from .quasi_static import QuasiStaticSimulator, Stations
 from .record_rig import RecordSimulator
 from .rig_model import Model
@@ -51,7 +51,11 @@ class Evidence:
     """
 
     def __init__(
-        self, records: RecordSet, nominal: Mapping[str, float], slow: Stations | None = None
+        self,
+        records: RecordSet,
+        nominal: Mapping[str, float],
+        slow: Stations | None = None,
+        parts: tuple[Part, ...] | None = None,
     ) -> None:
         """Cut the records; raise InputError for a controller that is described badly.
 
@@ -59,6 +63,7 @@ class Evidence:
             records: the runs.
             nominal: datasheet values by the names of PLANT.
             slow: their stations, where they are compared by torque alone (`quasi_static`).
+            parts: into which the same runs are cut already, for other torques.
         """
         self.slow = slow is not None
         self.records = records = records if slow is None else slow.records
@@ -81,7 +86,7 @@ class Evidence:
         self.octaves = Octaves.of(self.hop, self.lines)
         held = held_lines(records, self.simulator.response, self.hop, self.lines)
         self._held = [self._beside_twist(lines, i) for i, lines in enumerate(held)]
-        self.parts = tuple(cut(records, self.hop, run_in))
+        self.parts = parts or tuple(cut(records, self.hop, run_in))
         own, bands = len(self.octaves), self.octaves.of_line
         self._band = np.concatenate([bands + own * k for k in range(self.bands // own)])
 

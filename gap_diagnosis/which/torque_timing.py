@@ -93,8 +93,7 @@ def timed(
     if None not in loop.laws or loop.commanded:
         return held
     progress("refit with a torque that is not held")
-    flowing = with_continuous_torque(records, loop)
-    other = CellFitter(Evidence(flowing, nominal), plant, tolerance)
+    other = fitter.with_runs(with_continuous_torque(records, loop))
     again = other.refit()
     late = _late(other, again)
     if "delay" in late.effects and _half(late.model, "delay", records.sample_rate_hz):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -39,6 +40,33 @@ def test_a_torque_that_went_on_between_its_samples_is_told_from_one_that_was_hel
     assert timing.notes == told
     assert timing.refit.model.plant["jm"] == pytest.approx(NOMINAL["jm"], rel=0.05)
     assert timing.held == (not told)
+
+
+def test_runs_keep_their_purposes_whatever_their_torque_is_taken_for():
+    """Which runs fit goes by the peaks of their torques, which means over samples change.
+
+    A run of another length in another place had errors of another number: a crash.
+    """
+    recorded = driven_runs(finer=FINER)
+    first, second, *others = recorded.records
+    peak = np.abs(first.torque).max()
+    spiked = second.torque.copy()
+    spiked[1000] = 1.01 * peak * np.sign(spiked[1000])
+    short = [replace(r, torque=0.9 * r.torque, position=0.9 * r.position) for r in others]
+    mixed = [cut(first, 3600), replace(second, torque=spiked), *short]
+    records = replace(recorded, records=tuple(mixed))
+    as_recorded = Evidence(records, NOMINAL)
+    flowing = with_continuous_torque(records, as_recorded.simulator.loop)
+    assert Evidence(flowing, NOMINAL).parts != as_recorded.parts
+    timing = timed(records, NOMINAL, 0.1, lambda _: None)
+    both = [timing, timing.other] if timing.other else [timing]
+    assert all(one.fitter.evidence.parts == as_recorded.parts for one in both)
+    assert not timing.held
+
+
+def cut(record, samples):
+    """Return a record's first samples."""
+    return replace(record, torque=record.torque[:samples], position=record.position[:samples])
 
 
 @pytest.mark.parametrize(("finer", "held"), [(1, True), (FINER, False)])
