@@ -48,9 +48,10 @@ class Timing:
     def other_if_better(self, best: CellFit, sought: Sequence[str]) -> Timing | None:
         """Return the other way, if what was found speaks for it.
 
-        A signal that was found to come half a sample late is one that is held; a torque that was
-        held while causes were missing may do clearly better as a signal beside them, and so may a
-        signal as a torque that is held, where no delay was sought.
+        A signal that was found to come half a sample late is one that is held; one that comes late
+        by another time may do clearly better as a held torque behind a delay or a lag: its means
+        over samples lag too. A torque that was held while causes were missing may do clearly better
+        as a signal beside them, and so may a signal as a held torque, where no delay was sought.
 
         Args:
             best: what was found.
@@ -59,17 +60,19 @@ class Timing:
         other = self.other
         if other is None:
             return None
-        rate = self.fitter.evidence.records.sample_rate_hz
-        late = [e for e in best.effects if e in _LATE and _half(best.model, e, rate)]
         if self.held or not {*sought} & {*_LATE}:
             in_the_other = other.fitter.taken_over(best)
             return other if gain(self.fitter, in_the_other, best).present else None
-        if not late:
+        late = next((effect for effect in best.effects if effect in _LATE), None)
+        if late is None:
             return None
-        (effect,) = late[:1]
-        worth = gain(self.fitter, best, self.fitter.without(best, effect)).mean
-        held = other.fitter.without(best, effect)
-        return other if stands_for(self.fitter, held, best, worth) else None
+        held = other.fitter.without(best, late)
+        if _half(best.model, late, self.fitter.evidence.records.sample_rate_hz):
+            worth = gain(self.fitter, best, self.fitter.without(best, late)).mean
+            if stands_for(self.fitter, held, best, worth):
+                return other
+        tried = [_with(other.fitter, held, effect) for effect in _LATE]
+        return other if any(gain(self.fitter, fit, best).present for fit in tried) else None
 
 
 def _half(model: Model, effect: str, rate: float) -> bool:
@@ -95,19 +98,19 @@ def timed(
     progress("refit with a torque that is not held")
     other = fitter.with_runs(with_continuous_torque(records, loop))
     again = other.refit()
-    late = _late(other, again)
+    late = _with(other, again, "delay")
     if "delay" in late.effects and _half(late.model, "delay", records.sample_rate_hz):
         return held
     signal = Timing(other, again, (CONTINUOUS,), held=False)
-    if gain(fitter, late, _late(fitter, refit)).present:
+    if gain(fitter, late, _with(fitter, refit, "delay")).present:
         return replace(signal, other=held)
     return replace(held, other=signal)
 
 
-def _late(fitter: CellFitter, refit: CellFit) -> CellFit:
-    """Return a fit with a delay, taken to its end, where that gains."""
-    proposals = fitter.screening(refit, "delay").proposals()
-    delayed = fitter.add(refit, "delay", proposals) if proposals else None
-    if delayed is None or fitter.gains(delayed, refit).sum() <= 0.0:
-        return refit
-    return delayed if delayed.solution.converged else fitter.further(delayed)
+def _with(fitter: CellFitter, fit: CellFit, effect: str) -> CellFit:
+    """Return a fit with an effect, taken to its end, where that gains."""
+    proposals = fitter.screening(fit, effect).proposals()
+    more = fitter.add(fit, effect, proposals) if proposals else None
+    if more is None or fitter.gains(more, fit).sum() <= 0.0:
+        return fit
+    return more if more.solution.converged else fitter.further(more)
