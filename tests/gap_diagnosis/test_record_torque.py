@@ -70,18 +70,18 @@ def cut(record, samples):
 
 
 @pytest.mark.parametrize(
-    ("late", "finer", "held"),
-    [("actuator_lag.time_constant_s", 1, True), ("delay.time_s", FINER, False)],
+    ("late", "samples", "finer", "held"),
+    [("actuator_lag.time_constant_s", 0.5, 1, True), ("delay.time_s", 0.3, FINER, False)],
 )
-def test_a_held_torque_behind_a_lag_is_no_signal_that_comes_late(late, finer, held):
+def test_a_held_torque_behind_a_lag_is_no_signal_that_comes_late(late, samples, finer, held):
     """Means over samples lag too, so that a signal behind a delay does nearly as well."""
-    recorded = driven_runs({late: (0.5 if held else 0.9) / RATE}, finer=finer)
+    recorded = driven_runs({late: samples / RATE}, finer=finer)
     by_hold = CellFitter(Evidence(recorded, NOMINAL), NOMINAL, 0.1)
     loop = by_hold.evidence.simulator.loop
     by_signal = by_hold.with_runs(with_continuous_torque(recorded, loop))
     refit = by_signal.refit()
     delayed = by_signal.add(refit, "delay", by_signal.screening(refit, "delay").proposals())
-    assert delayed.model.effects["delay.time_s"] * RATE > 0.7
+    assert delayed.model.effects["delay.time_s"] * RATE > samples
     timing = Timing(by_signal, refit, (CONTINUOUS,), False, Timing(by_hold, by_hold.refit()))
     other = timing.other if held else None
     assert timing.other_if_better(delayed, ["delay", "actuator_lag"]) is other
