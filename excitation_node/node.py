@@ -103,7 +103,7 @@ class ExcitationNode(runtime.RigNode):
     def _on_pace(self, message: bytes) -> None:
         seconds, nanoseconds = _TIME.unpack_from(message)
         passed_ns = seconds * 1_000_000_000 + nanoseconds
-        # The sample after what was sent may be under way: of ticks the newest alone is sure to come.
+        # The sample after what was sent may be under way; of ticks only the newest is sure to come.
         # A time beyond that is an earlier realization's, and no pace for this one.
         if self._passed_ns < passed_ns <= max(self._sent_ns, self._unsent_ns):
             self._passed_ns = passed_ns

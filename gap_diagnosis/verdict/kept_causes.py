@@ -127,8 +127,7 @@ def kept(
         steps, tested = fewer, tests
     doubted = {e: p for e, p in doubted.items() if e not in steps[-1].effects}
     notes += unsure({e: p for e, p in doubted.items() if e in nearly_named})
-    named = bool(steps[-1].effects)
-    notes += beyond_named(doubted, left_of(fitter, found.best, steps[-1]), named)
+    notes += beyond_named(fitter, found.best, steps[-1], doubted)
     if tested and any(len(fit.effects) != count for count, fit in enumerate(steps)):
         steps = [steps[0], *_one_by_one(fitter, steps[-1], tested)]
     return replace(found, steps=steps, notes=tuple(notes), doubted=doubted), _bearing(tested)

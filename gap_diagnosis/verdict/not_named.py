@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 from fjr_sim_node import effects as fx
 
+from ..fits.cell_fits import CellFitter
+from ..fits.comparison import CellFit
+from ..fits.gains import left_of
 from ..outcome.verdict_words import explanation
 from .tested_causes import Tested
 
@@ -28,22 +31,28 @@ def unsure(doubted: Mapping[str, float]) -> list[str]:
     ]
 
 
-def beyond_named(doubted: Mapping[str, float], left: float, named: bool) -> list[str]:
+def beyond_named(
+    fitter: CellFitter, best: CellFit, named: CellFit, doubted: Collection[str]
+) -> list[str]:
     """Return the sentence on what was found beside the named causes and leaves much less with them.
 
+    None is said of causes that spoil what no fit has seen.
+
     Args:
-        doubted: presence of each, by its identifier.
-        left: what all that was found leaves, of the squared error of the named causes, or of the
-            refit.
-        named: whether there are any.
+        fitter: of both fits.
+        best: all that was found.
+        named: the named causes.
+        doubted: identifiers of effects that are not named since none is sure.
     """
-    if not doubted or not left < _MUCH:
+    more = [effect for effect in best.effects if effect not in named.effects]
+    left = left_of(fitter, best, named)
+    if not more or not {*more} <= {*doubted} or not left < _MUCH:
         return []
-    shown = ", ".join(explanation([effect]) for effect in doubted)
+    beside = (" as well", "the named causes leave") if named.effects else ("", "the refit leaves")
     return [
-        f"With {shown}{' as well' if named else ''}, {left:.0%} of the squared error would be left "
-        f"that {'the named causes leave' if named else 'the refit leaves'}: the catalogue may "
-        "account for it, but none of these effects is sure."
+        f"With {', '.join(explanation([effect]) for effect in more)}{beside[0]}, {left:.0%} of the "
+        f"squared error would be left that {beside[1]}: the catalogue may account for it, but none "
+        "of these effects is sure."
     ]
 
 

@@ -16,6 +16,7 @@ from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.model.rig_model import Model
 from gap_diagnosis.outcome.cause import LEAST_PRESENT, MOST_SHARE
 from gap_diagnosis.outcome.gap_size import Estimate
+from gap_diagnosis.outcome.verdict_words import explanation
 from gap_diagnosis.verdict import kept_causes as kept_causes_module
 from gap_diagnosis.verdict.kept_causes import (
     LEAST_BEARING,
@@ -30,7 +31,7 @@ from gap_diagnosis.verdict.kept_causes import (
     _twice,
     kept,
 )
-from gap_diagnosis.verdict.not_named import _bent, _changing, _kin
+from gap_diagnosis.verdict.not_named import _bent, _changing, _kin, beyond_named
 from gap_diagnosis.verdict.notes import unusual
 from gap_diagnosis.verdict.spoiling import spoils, unspoiled
 from gap_diagnosis.verdict.tested_causes import causes_with_tests
@@ -504,6 +505,20 @@ def test_what_others_needed_goes_when_they_no_longer_do(searched, tested, monkey
     )  # fmt: skip
     found, left = kept(fitter, Found(fits), SCATTER, lambda _: None, fits[-1].effects)
     assert found.best.effects == (last,) == tuple(t.effect for t in left)
+
+
+def test_what_would_leave_less_beside_the_named_causes_is_told_whole_or_not_at_all(searched):
+    """The sentence speaks of all that the best fit holds, so of no part that spoils other runs."""
+    fitter, fits = searched
+    best, refit = fits[-1], fits[0]
+    (said,) = beyond_named(fitter, best, refit, best.effects)
+    assert all(explanation([effect]) in said for effect in best.effects)
+    assert "that the refit leaves" in said and " as well" not in said
+    (said,) = beyond_named(fitter, best, fits[1], ["delay", "torque_bias", "dead_band"])
+    assert explanation([fits[1].effects[0]]) not in said and "dead band" not in said
+    assert " as well, " in said and "that the named causes leave" in said
+    assert beyond_named(fitter, best, refit, ["delay", "torque_bias"]) == []
+    assert beyond_named(fitter, best, best, best.effects) == []
 
 
 def test_causes_that_spoil_the_runs_which_report_are_taken_away(searched):
