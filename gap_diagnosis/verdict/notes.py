@@ -176,5 +176,6 @@ def at_limits(
         return []
     return [
         f"The fit ends as far from the datasheet as it may go ({', '.join(told)} it): check units "
-        "of the datasheet and the factor of the torque, or give a greater --tolerance."
+        "of the datasheet and the factor of the torque, or give a greater --tolerance. Noise of "
+        "the torque, or what no effect explains, may take a parameter there as well."
     ]
