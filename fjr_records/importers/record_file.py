@@ -11,7 +11,7 @@ import numpy as np
 from controller_node.transfer_function import TransferFunction
 from fjr_kit.errors import InputError
 
-from ..drive_off import off_ends
+from ..drive_off import off_times
 from . import coherence, impossible, part
 from .columns import read_columns
 from .doubts import doubts_of_signals, doubts_of_values
@@ -238,7 +238,7 @@ def understand(
     doubts = doubts_of_signals(
         path, signals, repetition, columns, options.swings_free, samples.doubts
     )
-    off = off_ends(signals["u"], signals["y"], rate_hz) if repetition is None else None
+    off = off_times(signals["u"], signals["y"], rate_hz) if repetition is None else None
     if off is not None and impossible.TORQUE not in doubts:
         unit = "N" if is_linear(columns) else "N m"
         notes += (f"{off.told(rate_hz, unit)}; analysis and diagnosis leave these out",)
