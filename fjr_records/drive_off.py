@@ -86,8 +86,8 @@ def off_times(torque: np.ndarray, position: np.ndarray, rate_hz: float) -> Off |
         rate_hz: their rate.
 
     Returns:
-        All of them, each with the margin beside it; None where the drive is on all the time, where
-        nothing shows that it is off, or where too little of the run would be left.
+        All of them, with the margins; None where nothing shows that the drive is off, or where too
+        little of the run would be left.
     """
     travel = float(np.ptp(position))
     step = position_step([position])
@@ -117,9 +117,10 @@ def off_times(torque: np.ndarray, position: np.ndarray, rate_hz: float) -> Off |
             after = position[stop : stop + int(_CAUGHT_S * rate_hz)] - place
             stop += _until_it_turns(after, _GIVES * travel)
         at[max(span.start - margin, 0) : stop] = True
-    seen = np.concatenate([torque[s] for s, taken in zip(spans, takes, strict=True) if taken])
-    mean = sum(takes) / np.count_nonzero(takes)
-    return Off(at, float(np.sqrt(np.mean(seen**2))), float(mean))
+    for between in spans_of(~at):  # too short to show anything
+        at[between] |= between.stop - between.start < least
+    seen = float(np.sqrt(np.mean(torque[at & ~on] ** 2)))
+    return Off(at, seen, float(sum(takes) / np.count_nonzero(takes)))
 
 
 def _stands_without_torque(
@@ -137,8 +138,8 @@ def _until_it_turns(away: np.ndarray, most: float) -> int:
     """Return after how many samples an axis stands or turns; 0 if it goes away further before.
 
     Args:
-        away: its distance from where it stood, float64 (samples,), rad.
-        most: the furthest that it gives way (rad).
+        away: its distance from where it stood (samples,), rad.
+        most: the furthest that it gives way.
     """
     steps = np.diff(away)
     turns = np.flatnonzero(steps[1:] * steps[:-1] <= 0.0)
@@ -162,7 +163,10 @@ def _taken(
     weight or a load shows in the mean torque as well. A spring with a preload takes one torque
     above the place where it rests, the opposite one below, and none there.
     """
-    mean, away = float(torque.mean()), position - place
+    mean, size = float(torque.mean()), float(np.sqrt(np.mean(torque**2)))
+    if abs(mean) < _TAKES * size:
+        return 0.0
+    away = position - place
     for near in _NEAR:
         at = np.abs(away) <= near * travel
         common, friction = _common(torque, ways * at)
@@ -172,7 +176,7 @@ def _taken(
     if math.isnan(common) or any(each * common < _EACH_SIDE * common**2 for each in beside):
         return 0.0
     rubs = np.nanmax([friction, _common(torque, ways)[1]])
-    least = max(_TAKES * float(np.sqrt(np.mean(torque**2))), _BREAKS_AWAY * rubs)
+    least = max(_TAKES * size, _BREAKS_AWAY * rubs)
     return common if common * mean > 0.0 and min(abs(common), abs(mean)) >= least else 0.0
 
 

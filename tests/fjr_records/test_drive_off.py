@@ -86,6 +86,14 @@ def test_a_brake_that_closes_in_mid_run_is_found(noise):
     assert "the first 1.22 s, the last 1.22 s and 2.45 s between (once; from 9.38 s on)" in told
 
 
+def test_a_peak_of_torque_does_not_part_the_time_of_a_brake():
+    u, y = twice()
+    u[5300:5302] = 5.0
+    whole, parted = off_times(*twice(), RATE), off_times(u, y, RATE)
+    assert whole is not None and parted is not None
+    assert np.array_equal(whole.at, parted.at)
+
+
 def test_a_servo_at_rest_in_mid_run_holds_its_weight():
     assert off_times(*twice(braked=False), RATE) is None
 
