@@ -7,7 +7,7 @@ an `experiment_folder.ExperimentFolder`, which says what the bags are together (
 reduces a bag to spectra in one pass, `periodic` holds an experiment whole, cut into its periods,
 `records` whatever does not repeat; `lines`, `spectra`, `noise`, `record_noise` and `encoder_step`
 are what these rest on. `driven` and `units` doubt wrong signs and units, `drive_off` leaves out
-ends of records at which a closed brake holds the axis. `importers` turn foreign files into bags
+times of records at which a closed brake holds the axis. `importers` turn foreign files into bags
 (`importers.importer.import_files`).
 
     >>> from fjr_records import open_experiment, read_experiment

@@ -17,7 +17,7 @@ from fjr_interface.resampling.accuracy import Resampling
 from fjr_kit.errors import InputError
 
 from .discover import NoPeriodError
-from .drive_off import without_off_ends
+from .drive_off import without_off_times
 from .experiment_bag import Override
 from .experiment_folder import ExperimentFolder, open_experiment
 from .records import RecordSet, read_records, reference_optional
@@ -36,7 +36,7 @@ def open_folder(
     """Open a folder as an experiment of steady periods where it has them, else read its records.
 
     Bags say by their description which they are. Of bags without one the period is looked for; if
-    there is none they are records, and a note says why. Ends of records at which the drive is off
+    there is none they are records, and a note says why. Times of records at which the drive is off
     are left out.
 
     Args:
@@ -59,13 +59,13 @@ def open_folder(
                 f"{folder}: records are not cut into periods; leave out the number of periods, of "
                 "transient periods and of samples per period."
             )
-        return without_off_ends(read_records(folder, signal_map, resampling=resampling))
+        return without_off_times(read_records(folder, signal_map, resampling=resampling))
     try:
         return open_experiment(folder, signal_map, override=override, resampling=resampling)
     except NoPeriodError as error:
         if override != Override() or any(r.experiment is not None for r in readers):
             raise
-        records = without_off_ends(read_records(folder, signal_map, resampling=resampling))
+        records = without_off_times(read_records(folder, signal_map, resampling=resampling))
         why = f"{NOT_PERIODIC} ({str(error).rstrip('.')})."
         return replace(records, notes=(why, *records.notes))
 

@@ -215,21 +215,19 @@ def _steps(difference: np.ndarray) -> float | None:
 def _standstill(record: Record) -> float | None:
     """Return the scatter of the position where the axis stands; None if it never does.
 
-    Zero if it reads the same value there for ever. Ends at which a brake held the axis are asked
-    where it never stands by itself.
+    Zero if it reads the same value there for ever. Times at which a brake held the axis, which are
+    left out of the record, count as well.
     """
     least = _LEAST_STILL, _STILL_S * record.description.sample_rate_hz
     length = int(max(least))
     travel = float(np.ptp(record.position))
     own = [record.position] if record.samples >= 2 * length else []
-    for source in (own, record.held):
-        pieces = [
-            p for each in source for p in _pieces(each, length) if np.ptp(p) < _STILL * travel
-        ]
-        if pieces:
-            scatter = float(np.quantile([_detrended(piece) for piece in pieces], _QUIETEST))
-            return scatter if scatter > _SCATTERS * travel else 0.0
-    return None
+    pieces = [p for each in (*own, *record.held) for p in _pieces(each, length)]
+    still = [_detrended(piece) for piece in pieces if np.ptp(piece) < _STILL * travel]
+    if not still:
+        return None
+    scatter = float(np.quantile(still, _QUIETEST))
+    return scatter if scatter > _SCATTERS * travel else 0.0
 
 
 def _pieces(signal: np.ndarray, length: int) -> np.ndarray:

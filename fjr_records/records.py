@@ -38,7 +38,7 @@ class Record:
         position: y, likewise in rad.
         link: q, likewise in rad; None without a second encoder.
         elapsed_s: when it began, since the first run did (s); zero where that is not known.
-        held: position at the ends that were left out since the drive was off, for its noise.
+        held: position at the times that were left out since the drive was off, for its noise.
         after_s: of a stretch, how long its run had gone on before it (s); its controller has the
             state of that time, even where the axis stands at zero.
     """

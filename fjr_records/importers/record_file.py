@@ -11,7 +11,7 @@ import numpy as np
 from controller_node.transfer_function import TransferFunction
 from fjr_kit.errors import InputError
 
-from ..drive_off import off_ends
+from ..drive_off import off_times
 from . import coherence, impossible, part
 from .columns import read_columns
 from .doubts import doubts_of_signals, doubts_of_values
@@ -138,10 +138,6 @@ def read_samples(path: Path, options: ImportOptions) -> Samples:
         values, stamps = own_stamps(path, values, times)
     if len({id(each) for each in stamps.values()}) == 1:  # sampled together after all
         times, stamps = {TIME: stamps["position"]}, {}
-    speeds = {q: values.pop(q) for q in list(values) if columns[q].is_speed}
-    values, turns = without_wraps(values)
-    values |= speeds
-    notes += turns
     slow = {
         q.removesuffix(OWN_TIME) for q, each in columns.items() if is_time(q) and each.by_factor
     }
@@ -171,6 +167,8 @@ def read_samples(path: Path, options: ImportOptions) -> Samples:
             f"{path}: {left} samples at {timing.rate_hz:g} Hz are no record; give at least "
             f"{LEAST_SAMPLES} samples, in at most {LONGEST_S:g} s."
         )
+    values, turns = without_wraps(path, values, columns)
+    notes += turns
     said = (each.contradiction(q, headings[each.name]) for q, each in columns.items())
     own = timing.stamps_s.get("position")
     doubts = doubts_of_values(values, columns, timing.rate_hz, own)
@@ -240,7 +238,7 @@ def understand(
     doubts = doubts_of_signals(
         path, signals, repetition, columns, options.swings_free, samples.doubts
     )
-    off = off_ends(signals["u"], signals["y"], rate_hz) if repetition is None else None
+    off = off_times(signals["u"], signals["y"], rate_hz) if repetition is None else None
     if off is not None and impossible.TORQUE not in doubts:
         unit = "N" if is_linear(columns) else "N m"
         notes += (f"{off.told(rate_hz, unit)}; analysis and diagnosis leave these out",)
