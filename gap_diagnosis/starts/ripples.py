@@ -25,7 +25,7 @@ from fjr_sim_node.theory.linear import g0
 
 from ..model.evidence import Evidence
 from ..model.rig_model import Model
-from ..model.small_changes import changes, pulls
+from ..model.small_changes import averaged_over, changes, pulls
 from ..model.steady_runs import SteadyRuns
 from .over_angle import transformed, waves
 
@@ -36,7 +36,6 @@ _PARTS = (0.5, 0.25, 0.125)  # of a step, by which the best numbers are moved
 _LEAST_FIRST = 0.1  # of the second harmonic: a smaller first one is no ripple of that number
 _REST = 0.001  # of the rms velocity
 _FREE_HZ = 1e-3  # below, a free body has no response
-_LEAST_RATE = 8  # samples in a period of the highest line: averaging takes off 3 % there
 _FORGOTTEN = 1e-6  # of the energy of an impulse response: what is left of it then is no memory
 
 
@@ -70,7 +69,7 @@ class Ripples:
         self._torque = [run[1].astype(np.float32) for run in motion]
         self._twist = [(run[2] - run[0]).astype(np.float32) for run in motion]
         self._direction = [_direction(run[0]) for run in motion]
-        self._every = _averaged(evidence.hop, evidence.lines, self._whole_blocks())
+        self._every = averaged_over(evidence.hop, evidence.lines, self._whole_blocks())
         self._responses = [self._response(model, index, run.size // self._every) for index, run
                            in zip(self._runs, self._angles, strict=True)]  # fmt: skip
         self._basis = np.linalg.qr(parent.jacobian)[0]
@@ -281,19 +280,6 @@ def _direction(motion: np.ndarray) -> np.ndarray:
     speed = np.gradient(motion)
     moves = np.abs(speed) > _REST * np.sqrt(np.mean(speed**2))
     return np.where(moves, np.sign(speed), 0.0).astype(np.float32)
-
-
-def _averaged(hop: int, lines: int, whole: int = 0) -> int:
-    """Return over how many samples a signal may be averaged whose lines above `lines` don't count.
-
-    Args:
-        hop: of the lapped transform, samples; still an even number of averages.
-        lines: that count.
-        whole: samples that are a whole number of averages as well.
-    """
-    most = max(2 * hop // (_LEAST_RATE * lines), 1)
-    fits = (e for e in range(most, 0, -1) if hop % (2 * e) == 0 and whole % e == 0)
-    return next(fits)
 
 
 def _memory(impulse: np.ndarray) -> int:

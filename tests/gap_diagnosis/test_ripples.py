@@ -19,9 +19,8 @@ from gap_diagnosis.fits.cell_fits import CellFitter
 from gap_diagnosis.model import small_changes
 from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.model.rig_model import Model
-from gap_diagnosis.model.small_changes import changes
+from gap_diagnosis.model.small_changes import averaged_over, changes
 from gap_diagnosis.starts.over_angle import transformed
-from gap_diagnosis.starts.ripples import _averaged
 from gap_diagnosis.which.stepwise import Stepwise
 
 CASES = {
@@ -122,7 +121,7 @@ def test_pulls_are_transposed_changes(every):
 def test_averaged_changes_have_the_lines_of_the_changes(every):
     evidence = Evidence(records(seconds=32.0), NOMINAL)
     evidence.lines = evidence.hop // (4 * every)
-    assert _averaged(evidence.hop, evidence.lines) == every
+    assert averaged_over(evidence.hop, evidence.lines) == every
     highest = RATE / (8 * every)
     samples = evidence.records.records[0].samples
     rng = np.random.default_rng(every)
@@ -141,7 +140,7 @@ def test_averaged_changes_have_the_lines_of_the_changes(every):
 @pytest.mark.parametrize("hop", [8, 30, 160, 1806, 4000])
 @pytest.mark.parametrize("lines", [1, 7, 90])
 def test_averages_keep_eight_samples_in_a_period_and_an_even_hop(hop, lines):
-    every = _averaged(hop, lines)
+    every = averaged_over(hop, lines)
     assert every >= 1 and hop % (2 * every) == 0
     assert every == 1 or 2 * hop / every >= 8 * lines
 
