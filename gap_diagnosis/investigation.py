@@ -40,10 +40,11 @@ from .verdict.judgement import driven_backwards, judge, reproduced
 from .verdict.kept_causes import kept
 from .verdict.noisy_torque import beside_the_noise, unfelt_noise
 from .verdict.notes import of_fit, of_records, yielding
-from .verdict.tested_causes import Tested
+from .verdict.tested_causes import Tested, octaves_left
 from .which.exchange import with_the_better_one
 from .which.found import Found
 from .which.late_torque import is_late
+from .which.narrow_band import narrow
 from .which.rounding import beside_rounding
 from .which.torque_timing import Timing, timed
 
@@ -201,7 +202,9 @@ def investigate_runs(
     if backwards or ((tested or not names) and lost):
         found, tested, tied = replace(found, steps=found.steps[:1]), [], {}
         heard.append(BACKWARDS if backwards else LOST)
-    heard += yielding([t.effect for t in tested], fitter.misfit(found.best))
+    named = [t.effect for t in tested]
+    heard += yielding(named, fitter.misfit(found.best))
+    heard += narrow(named, octaves_left(fitter, found.best))
     alternatives = {effect: [fit.effects[-1] for fit in fits] for effect, fits in tied.items()}
     progress("judgement")
     notes = [*records.notes, *cut, *heard, *of_records(evidence, nominal), *of_fit(found)]

@@ -271,7 +271,7 @@ def ripple(name: str, unit: str, most: float, what: str) -> tuple[EffectParamete
     return (
         size(name, unit, f"Amplitude of {what}", 0.0, most),
         EffectParameter(
-            "cycles_per_turn", 1.0, "", "Periods in one turn of the motor angle", 0.01, 1e4,
+            "cycles_per_turn", 1.0, "", "Periods in one turn of the motor angle", 0.01, 1e6,
             role="cycles",
         ),
         angle("phase_rad", "Phase at angle zero"),

@@ -15,6 +15,8 @@ from .evidence import Evidence
 from .lapped import lapped, samples_of, unlapped
 from .parts import joined, spans_of
 
+_LEAST_RATE = 8  # samples in a period of the highest line: averaging takes off 3 % there
+
 
 def changes(
     evidence: Evidence, positions: Mapping[int, np.ndarray], which: Sequence[int], every: int = 1
@@ -64,3 +66,16 @@ def pulls(
     for part, own in zip(parts, np.split(whole, ends[:-1]), strict=True):
         found[part.record][samples_of(part.windows, hop)] += scale * unlapped(own, hop)
     return found
+
+
+def averaged_over(hop: int, lines: int, whole: int = 0) -> int:
+    """Return over how many samples a signal may be averaged whose lines above `lines` don't count.
+
+    Args:
+        hop: of the lapped transform, samples; still an even number of averages.
+        lines: that count.
+        whole: samples that are a whole number of averages as well.
+    """
+    most = max(2 * hop // (_LEAST_RATE * lines), 1)
+    fits = (e for e in range(most, 0, -1) if hop % (2 * e) == 0 and whole % e == 0)
+    return next(fits)

@@ -1,9 +1,10 @@
 """Ripples over the motor angle that could explain what a fit leaves of records.
 
-A ripple acts as a torque along the model's own motion. What it does to the position is predicted
-linearly, by the response of plant and controller (or observer), G/(1 + G C_y); back through that
-response goes what the fit leaves, and pulls at each of hundreds of numbers of ripples. Those that
-it pulls at most are calculated, and only the best are simulated. The torque is made at each
+A ripple acts as a torque along the recorded motion: it lies there though the model is a ripple
+further. What it does to the position is predicted linearly, by the response of plant and controller
+(or observer), G/(1 + G C_y); back through that response goes what the fit leaves, and pulls at each
+number of ripples. How much is the transform of the pull over the angle, one for all numbers. Those
+that it pulls at most are calculated, and only the best are simulated. The torque is made at each
 sample and then averaged over as many as the lines of the evidence allow. Along a steady period it
 is periodic as the motion is; along any other record the response is that from rest.
 """
@@ -24,15 +25,17 @@ from fjr_sim_node.theory.linear import g0
 
 from ..model.evidence import Evidence
 from ..model.rig_model import Model
-from ..model.small_changes import changes, pulls
+from ..model.small_changes import averaged_over, changes, pulls
 from ..model.steady_runs import SteadyRuns
+from .over_angle import transformed, waves
 
 _ALL = 120  # numbers of ripples of which each is calculated
 _SOME = 60  # of more than that, calculated wherever they lie, and as many that promise most
 _TINY = 1e-30
+_PARTS = (0.5, 0.25, 0.125)  # of a step, by which the best numbers are moved
 _LEAST_FIRST = 0.1  # of the second harmonic: a smaller first one is no ripple of that number
+_REST = 0.001  # of the rms velocity
 _FREE_HZ = 1e-3  # below, a free body has no response
-_LEAST_RATE = 8  # samples in a period of the highest line: averaging takes off 3 % there
 _FORGOTTEN = 1e-6  # of the energy of an impulse response: what is left of it then is no memory
 
 
@@ -62,20 +65,20 @@ class Ripples:
         self._run_in = records.run_in if isinstance(records, SteadyRuns) else 0
         whole = evidence.simulator.run([model], self._runs)[0]
         motion = [run[:, self._run_in :] for run in whole]
-        self._motor = [run[0] for run in motion]
+        self._angles = [records.records[i].position[self._run_in :] for i in self._runs]
         self._torque = [run[1].astype(np.float32) for run in motion]
         self._twist = [(run[2] - run[0]).astype(np.float32) for run in motion]
-        self._direction = [np.sign(np.gradient(run[0])).astype(np.float32) for run in motion]
-        self._every = _averaged(evidence.hop, evidence.lines, self._whole_blocks())
+        self._direction = [_direction(run[0]) for run in motion]
+        self._every = averaged_over(evidence.hop, evidence.lines, self._whole_blocks())
         self._responses = [self._response(model, index, run.size // self._every) for index, run
-                           in zip(self._runs, self._motor, strict=True)]  # fmt: skip
+                           in zip(self._runs, self._angles, strict=True)]  # fmt: skip
         self._basis = np.linalg.qr(parent.jacobian)[0]
         self._left = self._beyond(parent.residuals)
         self._stiffness = model.plant.get("k0", 0.0)
 
     def _whole_blocks(self) -> int:
         """Return how many samples averages must divide: those of a steady period; 0 for any."""
-        return math.gcd(self._run_in, self._motor[0].size) if self._run_in else 0
+        return math.gcd(self._run_in, self._angles[0].size) if self._run_in else 0
 
     def cycles(self, effect: str, tried: np.ndarray, most: int) -> list[float]:
         """Return the numbers of cycles per turn that promise most, best first.
@@ -85,9 +88,23 @@ class Ripples:
             tried: numbers to try, ascending.
             most: how many to return, each a maximum of its own.
         """
-        tried = self._likely(effect, tried, 1)
-        gains = np.array([self._fitted(effect, (float(cycles),))[1] for cycles in tried])
-        return [float(tried[i]) for i in _peaks(gains)[:most]]
+        likely, step = self._likely(effect, tried, 1), float(np.ptp(tried)) / max(len(tried) - 1, 1)
+        gains = np.array([self._gain(effect, cycles) for cycles in likely])
+        best = _peaks(gains)[:most]
+        return [self._refined(effect, likely[i], gains[i], step) for i in best]
+
+    def _gain(self, effect: str, cycles: float) -> float:
+        """Return the fall of the cost by a number of cycles."""
+        return self._fitted(effect, (float(cycles),))[1]
+
+    def _refined(self, effect: str, cycles: float, gain: float, step: float) -> float:
+        """Return the number of cycles that gains most, near one that gains more than its next."""
+        for part in _PARTS:
+            sides = [cycles + sign * part * step for sign in (-1.0, 1.0)]
+            gains = [self._gain(effect, side) for side in sides]
+            if max(gains) > gain:
+                cycles, gain = sides[int(np.argmax(gains))], max(gains)
+        return float(cycles)
 
     def harmonics(self, effect: str, tried: np.ndarray, most: int) -> list[dict[str, float]]:
         """Return the ripples with a second harmonic that promise most, best first.
@@ -135,27 +152,34 @@ class Ripples:
 
         Args:
             effect: identifier of an effect that is periodic in the motor angle.
-            tried: numbers to try, ascending.
+            tried: numbers to try, ascending in even steps.
             harmonics: of a ripple, which count together.
         """
         if len(tried) <= _ALL:
             return tried
-        some = tried[np.linspace(0, len(tried) - 1, _SOME).astype(int)]
-        met = [self._pull(effect, c) / max(self._fitted(effect, (c,))[1], _TINY) for c in some]
+        pulls = [self._pulled(effect, h * tried) for h in range(1, harmonics + 1)]
+        at = np.unique(np.geomspace(1, len(tried), _SOME).astype(int)) - 1
+        met = [max(self._gain(effect, tried[k]), _TINY) / pulls[0][k] for k in at]
         gains = np.zeros(len(tried))
-        for harmonic in range(1, harmonics + 1):
-            pull = np.array([self._pull(effect, harmonic * c) for c in tried])
-            gains += pull / np.exp(np.interp(harmonic * tried, some, np.log(met)))
-        return np.union1d(some, tried[_peaks(gains)[: _ALL - _SOME]])
+        for harmonic, pull in enumerate(pulls, 1):
+            number = np.log(harmonic * tried)
+            gains += pull * np.exp(np.interp(number, np.log(tried[at]), np.log(met)))
+        return np.union1d(tried[at], tried[_peaks(gains)[: _ALL - len(at)]])
 
-    def _pull(self, effect: str, cycles: float) -> float:
-        """Return the square of what pulls at sine and cosine of a number of cycles."""
-        total = np.zeros(2)
+    def _pulled(self, effect: str, tried: np.ndarray) -> np.ndarray:
+        """Return the squares of what pulls at sine and cosine of numbers of cycles.
+
+        Args:
+            effect: identifier of an effect that is periodic in the motor angle.
+            tried: numbers of cycles in even steps, at least two.
+        """
+        found = np.zeros(len(tried), complex)
         for k, pull in enumerate(self._pulls):
-            samples = pull.shape[1]
-            torques = self._torques(effect, k, cycles)[:, :samples].reshape(-1, 2, samples)
-            total += np.einsum("fnt,ft->n", torques, pull[: len(torques)])
-        return float(total @ total) + _TINY
+            angle = self._angles[k][: pull.shape[1]]
+            for place, of_slope, factor in self._factors(effect, k):
+                sums = transformed(factor[: angle.size] * pull[place], angle, tried)
+                found += 1j * tried * sums if of_slope else sums
+        return np.abs(found) ** 2 + _TINY
 
     @cached_property
     def _pulls(self) -> list[np.ndarray]:
@@ -177,16 +201,29 @@ class Ripples:
             (2, N) on the motor; (4, N) where the link feels torques too: the last two act between
             link and motor.
         """
-        turns = waves(cycles, self._motor[k])
-        acts_on = fx.EFFECTS[effect].acts_on
+        turns = waves(cycles, self._angles[k])
+        slopes = np.float32(cycles) * np.array([turns[1], -turns[0]])
+        found = [factor * (slopes if of_slope else turns)
+                 for _, of_slope, factor in self._factors(effect, k)]  # fmt: skip
+        return np.concatenate(found)
+
+    def _factors(self, effect: str, k: int) -> list[tuple[int, bool, np.ndarray]]:
+        """Return what makes torques of a ripple's waves, or of their slopes over the angle.
+
+        Returns:
+            0 for a torque on the motor, 1 for one between link and motor, in this order; whether
+            slopes make it; (N,), what they are multiplied by.
+        """
+        acts_on, direction = fx.EFFECTS[effect].acts_on, self._direction[k]
         if acts_on == "motor":
-            return -turns * self._direction[k]
+            return [(0, False, -direction)]
         if acts_on == "transmission":
-            slopes = np.float32(cycles) * np.array([turns[1], -turns[0]])
-            return np.float32(self._stiffness) * np.concatenate([-slopes * self._twist[k], turns])
+            stiffness = np.full_like(direction, self._stiffness)
+            return [(0, True, -stiffness * self._twist[k]), (1, False, stiffness)]
+        moves = np.abs(direction)
         if not fx.EFFECTS[effect].full_parameters[0].unit:  # a share of the torque, not a torque
-            return turns * self._torque[k]
-        return turns
+            return [(0, False, moves * self._torque[k])]
+        return [(0, False, moves)]
 
     def _moved(self, k: int, torques: np.ndarray) -> np.ndarray:
         """Return the changes of the position by `_torques`, averaged, (2, N // every)."""
@@ -238,32 +275,17 @@ def _peaks(gains: np.ndarray) -> np.ndarray:
     return np.asarray(peaks[np.argsort(-gains[peaks])])
 
 
-def _averaged(hop: int, lines: int, whole: int = 0) -> int:
-    """Return over how many samples a signal may be averaged whose lines above `lines` don't count.
-
-    Args:
-        hop: of the lapped transform, samples; still an even number of averages.
-        lines: that count.
-        whole: samples that are a whole number of averages as well.
-    """
-    most = max(2 * hop // (_LEAST_RATE * lines), 1)
-    fits = (e for e in range(most, 0, -1) if hop % (2 * e) == 0 and whole % e == 0)
-    return next(fits)
+def _direction(motion: np.ndarray) -> np.ndarray:
+    """Return the direction of a motion, float32 (samples,); 0 at rest, where friction holds."""
+    speed = np.gradient(motion)
+    moves = np.abs(speed) > _REST * np.sqrt(np.mean(speed**2))
+    return np.where(moves, np.sign(speed), 0.0).astype(np.float32)
 
 
 def _memory(impulse: np.ndarray) -> int:
     """Return after how many samples an impulse response is forgotten."""
     left = np.cumsum(impulse[::-1].astype(np.float64) ** 2)[::-1]
     return int(np.count_nonzero(left > _FORGOTTEN * left[0]))
-
-
-def waves(cycles: float, angle: np.ndarray) -> np.ndarray:
-    """Return sine and cosine of some cycles a turn along an angle (rad), float32 (2, ...).
-
-    They are off by 6e-8 times the phase: by half a percent at a thousand turns of a ripple.
-    """
-    turned = (cycles * angle).astype(np.float32)
-    return np.array([np.sin(turned), np.cos(turned)])
 
 
 def of_pair(p: Mapping[str, float], frequency_hz: np.ndarray) -> np.ndarray:

@@ -17,7 +17,10 @@ from fjr_sim_node import effects as fx
 
 _QUARTER_CYCLE = 0.2  # rad of rms motion: about a quarter of what is then travelled to and fro
 _FINE, _COARSE = 0.065, 0.5  # rad of rms motion from one number of ripples to the next
-_MOST_CYCLES = 400
+_FEW_CYCLES, _MOST_CYCLES = 400, 400_000  # at the finer steps, at all
+_FINEST_CYCLES = 9e5
+_STRETCH = 30  # samples: of the finest ripples ten pass in as many
+_OF_THE_WAY = 0.1  # that is travelled so slowly that the finest ripples are sampled
 _SPEED_BANDS = 40
 _NEAR_NO_LOAD = 0.05
 
@@ -38,6 +41,8 @@ class Scales:
         peak_torque_nm: greatest torque; a drive that saturates does so below it, and far below
             where the loop then asks for more.
         travel_rad: greatest range of the motion within one run; infinite where nobody looked.
+        slow_rad_s: velocity below which a tenth of the way is travelled; of the rms velocity where
+            nobody looked.
         corners: pairs of motor speed (rad/s) and greatest torque (N m) in its direction.
     """
 
@@ -50,6 +55,7 @@ class Scales:
     inertia_kg_m2: float
     peak_torque_nm: float
     travel_rad: float = math.inf
+    slow_rad_s: float = math.inf
     corners: tuple[tuple[float, float], ...] = ()
 
     @classmethod
@@ -84,6 +90,7 @@ class Scales:
             inertia_kg_m2=nominal["jm"] + nominal.get("j", 0.0),
             peak_torque_nm=max(float(np.abs(u).max()) for u in torques) or 1.0,
             travel_rad=max(float(np.ptp(y)) for y in positions),
+            slow_rad_s=_slow(positions) * sample_rate_hz,
             corners=_corners(
                 np.concatenate(speeds),
                 np.concatenate(
@@ -148,17 +155,24 @@ class Scales:
         """Return the numbers of ripples per turn that the motion can show, ascending.
 
         From about a quarter of a ripple over what is travelled to and fro, to three samples in a
-        ripple at the rms velocity. Neighbours are as near as a fit can bridge; beyond what that
-        allows whole numbers follow, as the poles and slots of motors have.
+        ripple where the motion is slow, in even steps that a fit can bridge.
         """
         low = max(_QUARTER_CYCLE / self.angle_rad, 0.02)
-        high = 2.0 * np.pi / (3.0 * self.period_s * self.velocity_rad_s)
-        high = float(np.clip(high, 4.0 * low, 9e3))
-        step = max((high - low) / _MOST_CYCLES, _FINE / self.angle_rad)
+        sampled = 2.0 * np.pi / (3.0 * self.period_s)
+        usual = max(sampled / self.velocity_rad_s, 4.0 * low)
+        high = max(min(sampled / self.slow_rad_s, _FINEST_CYCLES), usual)
+        step = max((usual - low) / _FEW_CYCLES, _FINE / self.angle_rad)
         step = min(step, _COARSE / self.angle_rad)
-        near = low + step * np.arange(min(_MOST_CYCLES, int((high - low) / step) + 1))
-        whole = np.arange(np.ceil(near[-1]) + 1.0, high)[:_MOST_CYCLES]
-        return np.concatenate([near, whole])
+        return low + step * np.arange(min(int((high - low) / step), _MOST_CYCLES) + 1)
+
+
+def _slow(positions: Sequence[np.ndarray]) -> float:
+    """Return the way of a sample below which a tenth of all is travelled, infinite if none is."""
+    ways = np.sort(np.abs(np.concatenate([np.diff(y[::_STRETCH]) for y in positions])))
+    travelled = np.cumsum(ways)
+    if not ways.size or not travelled[-1]:
+        return math.inf
+    return float(ways[np.searchsorted(travelled, _OF_THE_WAY * travelled[-1])]) / _STRETCH
 
 
 def _corners(speeds: np.ndarray, torques: np.ndarray) -> tuple[tuple[float, float], ...]:

@@ -9,12 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..fits.cell_fits import CellFitter
-from ..fits.comparison import CellFit
+from ..fits.comparison import NOTHING_LEFT, CellFit
 from ..fits.gains import LEAST_GAIN, MOST_P, Gain, beside_others, closed, fall, gain
 from ..how_far.ledger import Ledger
 from ..outcome.cause import LEAST_PRESENT
 from ..outcome.gap_size import Figure
 from ..starts.ripples_passed import doubt_of_shape, ripples_passed
+from ..which.narrow_band import LINEAR, doubt_of_band, octaves_moved
 from ..which.presence import (
     LEAST_INVARIANCE_P,
     SAME_WORTH,
@@ -79,6 +80,7 @@ class Tested:
         ripples: how many of its ripples the motion passes; infinite for what has none.
         unusual: its size over the greatest that machines have, see `EffectParameter.usual`.
         behind: how many samples in a row it holds the torque back; infinite for what is no rate.
+        octaves: of the motion, where it is a linear law that leaves more than noise; else infinite.
     """
 
     effect: str
@@ -98,6 +100,7 @@ class Tested:
     borne: float = 0.0
     unusual: float = 0.0
     behind: float = math.inf
+    octaves: float = math.inf
 
     @property
     def passed(self) -> bool:
@@ -212,6 +215,7 @@ class Tested:
         )
         sure *= _IF_OF_FORM + (1.0 - _IF_OF_FORM) * float(beyond_form)
         sure *= doubt_of_shape(self.ripples) * doubt_of_rate(self.behind)
+        sure *= doubt_of_band(self.octaves)
         sure *= float(np.interp(self.unusual, _UNUSUAL, (1.0, _IF_UNUSUAL)))
         if not self.certain or self.bounded is not None:
             sure *= _UNCERTAIN
@@ -237,6 +241,7 @@ def causes_with_tests(
     squares = [float(ledger.squares(each.model).sum()) for each in (fit, refit)]
     left = squares[0] / max(squares[1], 1e-300)
     over_noise = _left_over_noise(fitter, fit, refit)
+    octaves = octaves_left(fitter, fit)
     found = []
     for effect, without in fewer.items():
         sizes = invariance(fitter, fit, effect, scatter)
@@ -260,9 +265,18 @@ def causes_with_tests(
                 1.0 - _left_over_noise(fitter, fit, without),
                 unusual=over_usual(fit.model, effect),
                 behind=samples_behind(fit.model, effect, fitter.evidence.records),
+                octaves=octaves if effect in LINEAR else math.inf,
             )
         )
     return found
+
+
+def octaves_left(fitter: CellFitter, fit: CellFit) -> float:
+    """Return the octaves of the motion; infinite where a fit leaves noise, or none is compared."""
+    evidence = fitter.evidence
+    if evidence.slow or evidence.records.swings_free or fitter.misfit(fit) < NOTHING_LEFT:
+        return math.inf
+    return octaves_moved(evidence.records)
 
 
 def _left_over_noise(fitter: CellFitter, after: CellFit, before: CellFit) -> float:

@@ -2,21 +2,31 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
+from scipy.ndimage import uniform_filter1d
 from test_evidence import NOMINAL, RATE, records
 
+from controller_node import pd_filtered
+from fjr_interface.experiment import RecordDescription
+from fjr_records.records import Record, RecordSet
+from fjr_sim_node import effects as fx
+from fjr_sim_node.plant import coefficients
+from fjr_sim_node.simulation.closed_loop import simulate
 from gap_diagnosis.fits.cell_fits import CellFitter
 from gap_diagnosis.model import small_changes
 from gap_diagnosis.model.evidence import Evidence
-from gap_diagnosis.model.small_changes import changes
-from gap_diagnosis.starts.ripples import _averaged
+from gap_diagnosis.model.rig_model import Model
+from gap_diagnosis.model.small_changes import averaged_over, changes
+from gap_diagnosis.starts.over_angle import transformed
 from gap_diagnosis.which.stepwise import Stepwise
 
 CASES = {
     "position_friction": ({"amplitude_nm": 1.5, "cycles_per_turn": 30.0, "phase_rad": 0.7}, 2.0),
     "kinematic_error": ({"amplitude_rad": 1e-3, "cycles_per_turn": 33.0, "phase_rad": 0.7}, 4.0),
-    "cogging": ({"amplitude_nm": 1.5, "cycles_per_turn": 57.0, "phase_rad": 0.7}, 1.5),
+    "cogging": ({"amplitude_nm": 1.5, "cycles_per_turn": 57.0, "phase_rad": 0.7}, 3.5),
     "torque_constant_ripple": (
         {"amplitude": 0.08, "cycles_per_turn": 31.0, "phase_rad": 0.7}, 1.5,
     ),
@@ -86,7 +96,7 @@ def test_what_pulls_at_a_ripple_tells_what_it_gains(effect):
     ripples = fitter._ripples(fitter.refit())[0]
     tried = np.linspace(20.0, 80.0, 31)
     gains = np.array([ripples._fitted(effect, (c,))[1] for c in tried])
-    pulls = np.array([ripples._pull(effect, c) for c in tried])
+    pulls = ripples._pulled(effect, tried)
     met = np.interp(tried, tried[::5], (pulls / gains)[::5])
     assert pulls / met == pytest.approx(gains, rel=0.1)
 
@@ -111,7 +121,7 @@ def test_pulls_are_transposed_changes(every):
 def test_averaged_changes_have_the_lines_of_the_changes(every):
     evidence = Evidence(records(seconds=32.0), NOMINAL)
     evidence.lines = evidence.hop // (4 * every)
-    assert _averaged(evidence.hop, evidence.lines) == every
+    assert averaged_over(evidence.hop, evidence.lines) == every
     highest = RATE / (8 * every)
     samples = evidence.records.records[0].samples
     rng = np.random.default_rng(every)
@@ -130,6 +140,76 @@ def test_averaged_changes_have_the_lines_of_the_changes(every):
 @pytest.mark.parametrize("hop", [8, 30, 160, 1806, 4000])
 @pytest.mark.parametrize("lines", [1, 7, 90])
 def test_averages_keep_eight_samples_in_a_period_and_an_even_hop(hop, lines):
-    every = _averaged(hop, lines)
+    every = averaged_over(hop, lines)
     assert every >= 1 and hop % (2 * every) == 0
     assert every == 1 or 2 * hop / every >= 8 * lines
+
+
+def axis(travel: float, speeds: tuple[float, ...], cycles: float, seed: int) -> CellFitter:
+    """Return a fitter for runs of a rigid axis with cogging that goes from place to place.
+
+    Its loop is not known.
+
+    Args:
+        travel: of the axis, rad or m.
+        speeds: of its moves, rad/s or m/s.
+        cycles: of its cogging, per 2 pi rad or m.
+        seed: of its places and noise.
+    """
+    rng, friction = np.random.default_rng(seed), 5.0 * max(speeds)
+    bare = Model({"jm": 1.0, "fsm": friction, "fvm": 0.5}, {})
+    named = {"amplitude_nm": 0.3 * friction, "cycles_per_turn": cycles, "phase_rad": 0.7}
+    cogging = fx.coefficients({f"cogging.{name}": value for name, value in named.items()})
+    law = pd_filtered.CONTROLLER.check({"sample_rate_hz": RATE, "p": 900.0, "d": 45.0, "n": 600.0})
+    made = []
+    for run in range(3):
+        way = [0.0]
+        while len(way) < 16.0 * RATE:
+            step = rng.choice(speeds) / RATE
+            way += np.arange(way[-1], end := rng.uniform(0.0, travel), math.copysign(
+                step, end - way[-1])).tolist()  # fmt: skip
+            way += [way[-1]] * int(0.1 * RATE)
+        reference = uniform_filter1d(np.array(way[: int(16.0 * RATE)]), int(0.1 * RATE))
+        noise = 3e-6 * travel * rng.standard_normal(reference.size)
+        moved = simulate(reference, RATE, coefficients(bare.whole_plant),
+                         pd_filtered.coefficients(law), noise, cogging)  # fmt: skip
+        description = RecordDescription.of(
+            "test", sample_rate_hz=RATE, level=0, levels=1, realization=run, realizations=3,
+            controller=None,
+        )  # fmt: skip
+        record = Record(f"run_{run}", description, None, moved.torque, moved.position, None)
+        made.append(record)
+    known = {"jm": 1.04, "fsm": 0.93 * friction, "fvm": 0.55}
+    evidence = Evidence(RecordSet("test", RATE, tuple(made)), Model(known, {}).whole_plant)
+    return CellFitter(evidence, known, 0.1)
+
+
+AXES = {
+    "a belt that is long for its pulley": (0.8, (0.02, 0.06, 0.2), 151.3),
+    "a linear motor": (0.3, (0.01, 0.03, 0.1), 2.0 * math.pi / 0.012),
+    "a stepper on a belt": (0.2, (0.01, 0.03, 0.15), 2.0 * math.pi / 4e-4),
+    "a ball screw": (0.15, (0.008, 0.02, 0.05), 2.0 * math.pi / 1e-3),
+    "a joint, by the teeth of its gear": (2.0, (0.1, 0.3, 1.0), 363.4),
+    "a motor of many turns": (60.0, (1.0, 4.0, 12.0), 38.3),
+}
+"""Travel, speeds and cycles per turn."""
+
+
+@pytest.mark.parametrize("name", AXES)
+def test_ripples_of_rotary_and_linear_axes_are_found_down_to_what_slow_stretches_show(name):
+    travel, speeds, cycles = AXES[name]
+    fitter = axis(travel, speeds, cycles, 7)
+    refit = fitter.refit()
+    fit = fitter.add(refit, "cogging", fitter.screening(refit, "cogging").proposals())
+    found = fit.model.effects["cogging.cycles_per_turn"]
+    assert found == pytest.approx(cycles, abs=1.0 / travel)
+
+
+def test_the_transform_over_an_angle_has_the_sums_of_all_numbers_of_waves():
+    rng = np.random.default_rng(3)
+    angle = np.cumsum(rng.standard_normal(5000)) * 1e-2
+    signal, cycles = rng.standard_normal(5000), 3.7 + 0.4 * np.arange(300)
+    exact = np.array([signal @ np.exp(1j * number * angle) for number in cycles])
+    found = transformed(signal, angle, cycles)
+    assert np.abs(found - exact).max() < 0.03 * np.abs(exact).max()
+    assert np.abs(found - exact)[:30].max() < 1e-3 * np.abs(exact).max()

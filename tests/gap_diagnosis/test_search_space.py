@@ -89,16 +89,37 @@ def test_the_gap_of_a_transmission_is_sought_in_its_deflection_not_in_the_motion
     assert starts("presliding_friction", stiff) == starts("presliding_friction", PAPER_LIKE)
 
 
-@given(any_scales())
-def test_ripples_are_those_that_the_motion_can_show(scales):
+@given(any_scales(), st.floats(0.01, 2.0))
+def test_ripples_are_those_that_the_motion_can_show(scales, slow):
+    """Down to a few in its slow stretches, in even steps that a fit can bridge."""
+    scales = replace(scales, slow_rad_s=slow * scales.velocity_rad_s)
     cycles = scales.cycles()
-    assert 1 < cycles.size < 1000 and (np.diff(cycles) > 0.0).all()
     travelled = 8.0 * scales.angle_rad  # to and fro, of a motion that looks like noise
     assert cycles[0] == pytest.approx(max(0.25 * 2.0 * math.pi / travelled, 0.02), rel=0.05)
-    fine = cycles[cycles <= cycles[0] + 0.5 / scales.angle_rad]
-    assert np.diff(fine).size == 0 or np.diff(fine).max() * scales.angle_rad <= 0.5 * (1 + 1e-9)
-    sampled = 2.0 * math.pi / (3.0 * scales.period_s * scales.velocity_rad_s)
+    step = cycles[1] - cycles[0]
+    assert 0.0 < step * scales.angle_rad <= 0.5 * (1 + 1e-9)
+    assert np.diff(cycles) == pytest.approx(np.full(cycles.size - 1, step), rel=1e-6)
+    sampled = 2.0 * math.pi / (3.0 * scales.period_s * min(slow, 1.0) * scales.velocity_rad_s)
     assert cycles[-1] <= max(sampled, 4.0 * cycles[0]) * (1 + 1e-9)
+    assert cycles[-1] >= min(0.9 * sampled, 8e5) or cycles.size > 400_000
+    assert (
+        scales.bounds("cogging.cycles_per_turn")[1] <= fx.parameter("cogging.cycles_per_turn").high
+    )
+
+
+def test_slow_stretches_show_finer_ripples_and_rest_shows_none():
+    rng = np.random.default_rng(1)
+    pieces = [np.zeros(3000), *(np.full(1000, way) for way in (1e-3, -1e-4, -9e-4)), np.zeros(3000)]
+    way = np.cumsum(np.concatenate(pieces))
+    nominal = {"jm": 0.5}
+    noisy = way + 1e-5 * rng.standard_normal(way.size)
+    scales = Scales.of_record([noisy], [np.ones(way.size)], 1000.0, 100.0, nominal)
+    assert scales.slow_rad_s == pytest.approx(0.9, rel=0.1)  # a twentieth of the way is slower
+    slower = np.cumsum(np.concatenate([*pieces, np.full(3000, 1e-4)]))
+    scales = Scales.of_record([slower], [np.ones(slower.size)], 1000.0, 100.0, nominal)
+    assert scales.slow_rad_s == pytest.approx(0.1, rel=0.1)
+    still = Scales.of_record([0.0 * way], [np.ones(way.size)], 1000.0, 100.0, nominal)
+    assert still.cycles().size > 1
 
 
 def test_scales_are_those_of_the_record():

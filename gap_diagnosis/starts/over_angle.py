@@ -1,0 +1,45 @@
+"""Waves over an angle, and the transform over it of signals of time: for all numbers of waves."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.fft import ifft, next_fast_len
+
+_PLACES = 8  # of the angle, in a wave of the greatest number beyond the least
+
+
+def waves(cycles: float, angle: np.ndarray) -> np.ndarray:
+    """Return sine and cosine of some cycles a turn along an angle (rad), float32 (2, ...).
+
+    They are off by 6e-8 times the phase: by half a percent at a thousand turns of a ripple.
+    """
+    turned = (cycles * angle).astype(np.float32)
+    return np.array([np.sin(turned), np.cos(turned)])
+
+
+def transformed(signal: np.ndarray, angle: np.ndarray, cycles: np.ndarray) -> np.ndarray:
+    """Return the sums of a signal times cosine + i sine along an angle, of numbers of cycles.
+
+    Each sample is shared by the two nearest of even places of the angle, so that one transform
+    gives all sums, to 3 % of the signal's.
+
+    Args:
+        signal: (samples,).
+        angle: (samples,), rad.
+        cycles: numbers per turn in even steps, at least two.
+
+    Returns:
+        complex (numbers,).
+    """
+    first, step = float(cycles[0]), float(cycles[-1] - cycles[0]) / (len(cycles) - 1)
+    places = next_fast_len(_PLACES * len(cycles))
+    place = angle * (step * places / (2.0 * np.pi))
+    below = np.floor(place).astype(int)
+    above = place - below
+    turned = signal * np.exp(1j * first * angle)
+    found = np.zeros(places, complex)
+    for at, share in ((below % places, 1.0 - above), ((below + 1) % places, above)):
+        found.real += np.bincount(at, share * turned.real, places)
+        found.imag += np.bincount(at, share * turned.imag, places)
+    shared = np.sinc(np.arange(len(cycles)) / places) ** 2
+    return np.asarray(places * ifft(found)[: len(cycles)] / shared)
