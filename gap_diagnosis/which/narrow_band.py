@@ -1,8 +1,9 @@
 """How broad the band of a motion is: at one frequency all linear laws are a stiffness and damping.
 
-A spring, a cable and viscous friction differ by how their torque changes with frequency. A motion
-that keeps to an octave hardly shows that: there each stands for whatever else moves the axis at its
-own pace, such as the leg of a human, as long as it leaves more than noise.
+Linear laws differ by how their torque changes with frequency. A motion that keeps to an octave
+hardly shows that: there a spring or a cable stands for whatever else moves the axis at its own
+pace, such as the leg of a human, as long as it leaves more than noise. Viscous friction could stand
+for that as well, but every machine has some.
 """
 
 from __future__ import annotations
@@ -14,8 +15,8 @@ import numpy as np
 
 from fjr_records.records import RecordSet
 
-LINEAR = ("external_spring", "cable", "viscous_friction")
-"""Laws whose torque on the axis is linear in its motion."""
+LINEAR = ("external_spring", "cable")
+"""Laws whose torque on the axis is linear in its motion, and which few machines have."""
 _BEYOND = 0.05  # of the power of the motion, that lies below its band, and as much above it
 _NARROW, _BROAD = 1.0, 2.0  # octaves, between which a law is less and less doubted
 _IF_NARROW = 0.5  # of its presence, what is left to a linear law in a narrow band
