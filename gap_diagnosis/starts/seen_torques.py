@@ -21,6 +21,7 @@ from fjr_sim_node import effects as fx
 
 from ..model.evidence import Evidence
 from ..model.rig_model import Model
+from .over_angle import transformed
 from .seen_inertia import SeenInertia
 from .seen_resonance import hidden, torque_of_mass, with_mass
 from .seen_together import LAWS, Seen, heavier, load_parameters, load_torques, solved
@@ -34,6 +35,7 @@ _REST, _FALLS, _SLIDES = 0.03, 0.05, 0.2
 """Of the rms velocity: below the first friction is whatever holds, above the second it may fall
 from breakaway; above the third it slides, though it yields before."""
 _PEAKS = 2
+_MOST_SEEN = 400  # numbers of ripples, of which each is fitted
 _NEARLY, _ALIKE = 0.95, 4  # of the best; how many of those that explain so much
 
 
@@ -227,6 +229,7 @@ class SeenTorques:
         base = [np.ones(angle.size), velocity, np.sign(velocity), angle, self._acceleration[rows]]
         basis = np.linalg.qr(np.array(base).T)[0]
         missing = _beyond(basis, self._missing[rows])
+        tried = _likely(missing * factor, angle, tried)
 
         def fitted(cycles: float) -> tuple[float, np.ndarray]:
             waves = factor[:, None] * np.array([np.sin(cycles * angle), np.cos(cycles * angle)]).T
@@ -248,6 +251,23 @@ class SeenTorques:
         if not entry.full_parameters[0].unit:  # a share of the torque, not a torque
             return self._torque
         return np.ones(self._angle.size)
+
+
+def _likely(pull: np.ndarray, angle: np.ndarray, tried: np.ndarray) -> np.ndarray:
+    """Return numbers of cycles from all over, and those that a torque pulls at most, ascending.
+
+    Args:
+        pull: what a torque at each time gains, (samples,).
+        angle: (samples,), rad.
+        tried: numbers per turn, ascending in even steps.
+    """
+    if tried.size <= _MOST_SEEN:
+        return tried
+    half = _MOST_SEEN // 2
+    even = np.linspace(0, tried.size - 1, half).astype(int)
+    pulls = np.abs(transformed(pull, angle, tried))
+    peaks = np.flatnonzero((pulls[1:-1] >= pulls[:-2]) & (pulls[1:-1] > pulls[2:])) + 1
+    return tried[np.union1d(even, peaks[np.argsort(-pulls[peaks])][:half])]
 
 
 def _seed(effect: str, cycles: float, sizes: np.ndarray) -> dict[str, float]:

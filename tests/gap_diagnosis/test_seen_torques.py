@@ -25,13 +25,13 @@ def named(effect: str) -> dict[str, float]:
     return {f"{effect}.{name}": value for name, value in CASES[effect].items()}
 
 
-@pytest.mark.parametrize("known", [True, False])
+@pytest.mark.parametrize(("known", "step"), [(True, 1.0), (False, 1.0), (False, 0.01)])
 @pytest.mark.parametrize("effect", CASES)
-def test_number_size_and_phase_are_seen(effect, known):
+def test_number_size_and_phase_are_seen(effect, known, step):
     truth = named(effect)
     fitter = CellFitter(Evidence(records(truth, known=known), NOMINAL), NOMINAL, 0.1)
     seen = SeenTorques(fitter.evidence, fitter.fit_parts, fitter.refit().model)
-    seeds = seen.seeds(effect, np.arange(20.0, 70.0))
+    seeds = seen.seeds(effect, np.arange(20.0, 70.0, step))
     cycles, phase = f"{effect}.cycles_per_turn", f"{effect}.phase_rad"
     (size,) = set(truth) - {cycles, phase}
     nearest = min(seeds, key=lambda seed: abs(seed[cycles] - truth[cycles]))
