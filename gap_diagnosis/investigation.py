@@ -34,6 +34,7 @@ from .outcome.verdict_words import BACKWARDS, LOST, ROUNDING
 from .searching import at_its_time, misses, stepwise
 from .starts.catalogue import catalogue
 from .starts.search_space import TOLERANCE
+from .verdict.between_regressions import reaching_to_torques
 from .verdict.coarse_encoder import with_coarse_encoder
 from .verdict.contenders import contenders, tied_fits
 from .verdict.judgement import driven_backwards, judge, reproduced
@@ -216,6 +217,8 @@ def investigate_runs(
     rivals = tuple(fit for fits in tied.values() for fit in fits)
     if unfelt is not None:
         diagnosis = beside_the_noise(diagnosis, fitted, found.best, unfelt)
+    else:
+        diagnosis = reaching_to_torques(diagnosis, fitted, found.best)
     chosen_of = {"contenders": contenders(fitter, found, rivals)}
     diagnosis = diagnosis.model_copy(update=chosen_of)
     if order.effects is None or ROUNDING in order.effects:

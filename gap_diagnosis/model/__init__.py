@@ -9,6 +9,6 @@ Steady periods are runs of one mean period (`steady_runs`, begun at `near_steady
 records may be. `evidence` cuts the errors into windows (`lapped`), cells (of bands, `octaves`) and
 `parts`, with the `twist` of a transmission whose link has an encoder; a torque counts as the motion
 that it would make against the loop (`held_motion`). `small_changes` leads from the position to the
-lines of the evidence and back. `nominal` reads datasheets, `controller_check`
-compares torque and law, `discretisation` measures the simulation's own error.
+lines of the evidence and back, `torque_errors` compares by torque. `nominal` reads datasheets,
+`controller_check` compares torque and law, `discretisation` measures the simulation's own error.
 """
