@@ -1,4 +1,4 @@
-"""Waves over an angle, and the transform over it of signals of time: for all numbers of waves."""
+"""Waves over an angle, the transform over it of signals of time for all numbers, and its peaks."""
 
 from __future__ import annotations
 
@@ -43,3 +43,10 @@ def transformed(signal: np.ndarray, angle: np.ndarray, cycles: np.ndarray) -> np
         found.imag += np.bincount(at, share * turned.imag, places)
     shared = np.sinc(np.arange(len(cycles)) / places) ** 2
     return np.asarray(places * ifft(found)[: len(cycles)] / shared)
+
+
+def peaks(gains: np.ndarray) -> np.ndarray:
+    """Return the indices of the maxima, greatest first."""
+    padded = np.concatenate([[-1.0], gains, [-1.0]])
+    found = np.flatnonzero((gains >= padded[:-2]) & (gains > padded[2:]))
+    return np.asarray(found[np.argsort(-gains[found])])

@@ -17,6 +17,7 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property
 
 import numpy as np
+from scipy import ndimage
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
 from fjr_kit.least_squares import Solution
@@ -27,14 +28,14 @@ from ..model.evidence import Evidence
 from ..model.rig_model import Model
 from ..model.small_changes import averaged_over, changes, pulls
 from ..model.steady_runs import SteadyRuns
-from .over_angle import transformed, waves
+from .over_angle import peaks, transformed, waves
 
 _ALL = 120  # numbers of ripples of which each is calculated
 _SOME = 60  # of more than that, calculated wherever they lie, and as many that promise most
 _TINY = 1e-30
 _PARTS = (0.5, 0.25, 0.125)  # of a step, by which the best numbers are moved
 _LEAST_FIRST = 0.1  # of the second harmonic: a smaller first one is no ripple of that number
-_REST = 0.001  # of the rms velocity
+_REST, _RESTS_S = 0.001, 0.1  # of the rms velocity: below it an axis rests, for as long at least
 _FREE_HZ = 1e-3  # below, a free body has no response
 _FORGOTTEN = 1e-6  # of the energy of an impulse response: what is left of it then is no memory
 
@@ -68,7 +69,9 @@ class Ripples:
         self._angles = [records.records[i].position[self._run_in :] for i in self._runs]
         self._torque = [run[1].astype(np.float32) for run in motion]
         self._twist = [(run[2] - run[0]).astype(np.float32) for run in motion]
-        self._direction = [_direction(run[0]) for run in motion]
+        self._direction = [np.sign(np.gradient(run[0])).astype(np.float32) for run in motion]
+        least = max(int(_RESTS_S * records.sample_rate_hz), 1)
+        self._moves = [_moves(run[0], least) for run in motion]
         self._every = averaged_over(evidence.hop, evidence.lines, self._whole_blocks())
         self._responses = [self._response(model, index, run.size // self._every) for index, run
                            in zip(self._runs, self._angles, strict=True)]  # fmt: skip
@@ -90,7 +93,7 @@ class Ripples:
         """
         likely, step = self._likely(effect, tried, 1), float(np.ptp(tried)) / max(len(tried) - 1, 1)
         gains = np.array([self._gain(effect, cycles) for cycles in likely])
-        best = _peaks(gains)[:most]
+        best = peaks(gains)[:most]
         return [self._refined(effect, likely[i], gains[i], step) for i in best]
 
     def _gain(self, effect: str, cycles: float) -> float:
@@ -121,7 +124,7 @@ class Ripples:
         fits = [self._fitted(effect, (float(c), 2.0 * float(c))) for c in tried]
         names = fx.EFFECTS[effect].names
         found = []
-        for i in _peaks(np.array([gain for _, gain in fits]))[:most]:
+        for i in peaks(np.array([gain for _, gain in fits]))[:most]:
             sizes = fits[i][0]
             first, second = complex(*sizes[:2]), complex(*sizes[2:])
             phase, size = cmath.phase(first), max(abs(first), _LEAST_FIRST * abs(second))
@@ -164,7 +167,7 @@ class Ripples:
         for harmonic, pull in enumerate(pulls, 1):
             number = np.log(harmonic * tried)
             gains += pull * np.exp(np.interp(number, np.log(tried[at]), np.log(met)))
-        return np.union1d(tried[at], tried[_peaks(gains)[: _ALL - len(at)]])
+        return np.union1d(tried[at], tried[peaks(gains)[: _ALL - len(at)]])
 
     def _pulled(self, effect: str, tried: np.ndarray) -> np.ndarray:
         """Return the squares of what pulls at sine and cosine of numbers of cycles.
@@ -220,7 +223,7 @@ class Ripples:
         if acts_on == "transmission":
             stiffness = np.full_like(direction, self._stiffness)
             return [(0, True, -stiffness * self._twist[k]), (1, False, stiffness)]
-        moves = np.abs(direction)
+        moves = self._moves[k]
         if not fx.EFFECTS[effect].full_parameters[0].unit:  # a share of the torque, not a torque
             return [(0, False, moves * self._torque[k])]
         return [(0, False, moves)]
@@ -268,18 +271,16 @@ class Ripples:
         return errors - (errors @ self._basis) @ self._basis.T
 
 
-def _peaks(gains: np.ndarray) -> np.ndarray:
-    """Return the indices of the maxima, greatest first."""
-    padded = np.concatenate([[-1.0], gains, [-1.0]])
-    peaks = np.flatnonzero((gains >= padded[:-2]) & (gains > padded[2:]))
-    return np.asarray(peaks[np.argsort(-gains[peaks])])
+def _moves(motion: np.ndarray, least: int) -> np.ndarray:
+    """Return 1 where an axis moves, float32 (samples,), and 0 where it rests: friction holds it.
 
-
-def _direction(motion: np.ndarray) -> np.ndarray:
-    """Return the direction of a motion, float32 (samples,); 0 at rest, where friction holds."""
+    Args:
+        motion: (samples,), rad.
+        least: samples of a rest; where it only turns round it stands for less.
+    """
     speed = np.gradient(motion)
-    moves = np.abs(speed) > _REST * np.sqrt(np.mean(speed**2))
-    return np.where(moves, np.sign(speed), 0.0).astype(np.float32)
+    stands = np.abs(speed) <= _REST * np.sqrt(np.mean(speed**2))
+    return (~ndimage.binary_opening(stands, np.ones(least))).astype(np.float32)
 
 
 def _memory(impulse: np.ndarray) -> int:

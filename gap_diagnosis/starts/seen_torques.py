@@ -21,7 +21,7 @@ from fjr_sim_node import effects as fx
 
 from ..model.evidence import Evidence
 from ..model.rig_model import Model
-from .over_angle import transformed
+from .over_angle import peaks, transformed
 from .seen_inertia import SeenInertia
 from .seen_resonance import hidden, torque_of_mass, with_mass
 from .seen_together import LAWS, Seen, heavier, load_parameters, load_torques, solved
@@ -265,9 +265,8 @@ def _likely(pull: np.ndarray, angle: np.ndarray, tried: np.ndarray) -> np.ndarra
         return tried
     half = _MOST_SEEN // 2
     even = np.linspace(0, tried.size - 1, half).astype(int)
-    pulls = np.abs(transformed(pull, angle, tried))
-    peaks = np.flatnonzero((pulls[1:-1] >= pulls[:-2]) & (pulls[1:-1] > pulls[2:])) + 1
-    return tried[np.union1d(even, peaks[np.argsort(-pulls[peaks])][:half])]
+    strongest = peaks(np.abs(transformed(pull, angle, tried)))[:half]
+    return tried[np.union1d(even, strongest)]
 
 
 def _seed(effect: str, cycles: float, sizes: np.ndarray) -> dict[str, float]:
@@ -289,9 +288,7 @@ def _best(explained: np.ndarray) -> list[int]:
 
     What moves over less than a ripple or two cannot tell one number of ripples from the next.
     """
-    padded = np.concatenate([[-np.inf], explained, [-np.inf]])
-    peaks = np.flatnonzero((padded[1:-1] >= padded[:-2]) & (padded[1:-1] >= padded[2:]))
-    highest = peaks[np.argsort(-explained[peaks])][:_PEAKS]
+    highest = peaks(explained)[:_PEAKS]
     near = np.flatnonzero(explained >= _NEARLY * explained.max())
     some = near[np.linspace(0, near.size - 1, min(near.size, _ALIKE)).astype(int)]
     return sorted({*highest.tolist(), *some.tolist()})

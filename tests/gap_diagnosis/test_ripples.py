@@ -26,7 +26,7 @@ from gap_diagnosis.which.stepwise import Stepwise
 CASES = {
     "position_friction": ({"amplitude_nm": 1.5, "cycles_per_turn": 30.0, "phase_rad": 0.7}, 2.0),
     "kinematic_error": ({"amplitude_rad": 1e-3, "cycles_per_turn": 33.0, "phase_rad": 0.7}, 4.0),
-    "cogging": ({"amplitude_nm": 1.5, "cycles_per_turn": 57.0, "phase_rad": 0.7}, 3.5),
+    "cogging": ({"amplitude_nm": 1.5, "cycles_per_turn": 57.0, "phase_rad": 0.7}, 1.5),
     "torque_constant_ripple": (
         {"amplitude": 0.08, "cycles_per_turn": 31.0, "phase_rad": 0.7}, 1.5,
     ),
