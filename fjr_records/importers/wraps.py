@@ -73,7 +73,8 @@ def without_wraps(
             continue
         added = _next_to(angle, found["position"]) if quantity == "reference" else None
         added = added or _with_turns(angle)
-        if not added.jumps.size:
+        jumps = added.jumps.size > 0
+        if not jumps and (added.rough is None or quantity == "reference"):
             continue
         if added.rough is None:
             found[quantity] = added.angle

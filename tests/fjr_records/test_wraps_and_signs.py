@@ -100,7 +100,10 @@ def test_a_linear_axis_and_a_speed_do_not_wrap():
 def test_an_angle_that_seems_to_wrap_is_refused(unit, low, edges):
     too_fast = wrapped(40.0 * TURNING[::10], low)
     between = np.interp(np.arange(0.0, 3999.0, 0.7), np.arange(4000), wrapped(TURNING, low))
-    for angle in (too_fast, between):
+    smoothed = np.convolve(
+        wrapped(TURNING, low), np.ones(3) / 3.0, "valid"
+    )  # no jump of half a turn
+    for angle in (too_fast, between, smoothed):
         with pytest.raises(InputError, match=re.escape(f"position seems to wrap at {edges}, but")):
             turned({"position": angle}, unit)
 
