@@ -222,3 +222,11 @@ class Diagnosis(Document):
         if gap is None:
             return None
         return gap.nrmse_position if self.compared == "motion" else gap.nrmse_torque
+
+    def with_parameters(self, parameters: dict[str, Estimate]) -> Diagnosis:
+        """Return it with other estimates of its parameters, and of those of its causes."""
+        causes = [
+            cause.model_copy(update={"parameters": {n: parameters[n] for n in cause.parameters}})
+            for cause in self.causes
+        ]
+        return self.model_copy(update={"parameters": parameters, "causes": causes})

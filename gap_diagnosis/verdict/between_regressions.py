@@ -56,13 +56,8 @@ def reaching_to_torques(diagnosis: Diagnosis, fitter: CellFitter, fit: CellFit) 
         for name, found in known.items()
         if name in values and _further(found, reaching[name]) > _TOLD
     ]
-    causes = [
-        cause.model_copy(update={"parameters": {n: reaching[n] for n in cause.parameters}})
-        for cause in diagnosis.causes
-    ]
     notes = [*diagnosis.notes, _note(told)] if told else diagnosis.notes
-    changes = {"parameters": reaching, "causes": causes, "notes": notes}
-    return diagnosis.model_copy(update=changes)
+    return diagnosis.with_parameters(reaching).model_copy(update={"notes": notes})
 
 
 def _note(told: list[str]) -> str:

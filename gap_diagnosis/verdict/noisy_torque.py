@@ -134,20 +134,14 @@ def beside_the_noise(
     without = space.model(np.clip(fit.solution.x - moved, *space.bounds()))
     values = {**without.plant, **without.effects}
     parameters = {n: _reaching(e, values.get(n)) for n, e in diagnosis.parameters.items()}
+    reaching = diagnosis.with_parameters(parameters)
     left = diagnosis.steps[1].chi2_per_dof
     sure = _NOT_NEEDED if left is not None and left < NOTHING_LEFT else 1.0
     causes = [
-        cause.model_copy(
-            update={
-                "present": sure * cause.present,
-                "parameters": {n: parameters[n] for n in cause.parameters},
-            }
-        )
-        for cause in diagnosis.causes
+        cause.model_copy(update={"present": sure * cause.present}) for cause in reaching.causes
     ]
     confidence = min((c.present for c in causes), default=diagnosis.confidence)
-    changes = {"parameters": parameters, "causes": causes, "confidence": confidence}
-    return diagnosis.model_copy(update=changes)
+    return reaching.model_copy(update={"causes": causes, "confidence": confidence})
 
 
 def _reaching(found: Estimate, without: float | None) -> Estimate:
