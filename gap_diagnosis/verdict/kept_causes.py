@@ -32,6 +32,7 @@ LEAST_BEARING = 0.2
 _TWICE = 0.15
 """Of what two near equivalents close: where each closes less beside the other, either alone does
 nearly all, and both together are one cause whose law has another form than the catalogue's."""
+_TRIED = 3  # of the causes that fail, those that gain least, one of which others do not miss
 _RIVALS = 3  # that did best when a cause was chosen, one of which may take its place
 
 
@@ -83,6 +84,16 @@ def kept(
         progress(f"tests of {' + '.join(fit.effects)}")
         return causes_with_tests(fitter, fit, steps[0], scatter) if fit.effects else []
 
+    def least_missed(causes: Sequence[Tested]) -> tuple[Tested, list[CellFit], list[Tested]]:
+        """Return the first without which no other fails, or the very first; steps and tests."""
+        trials = []
+        for cause in causes:
+            fewer = _taken_out(fitter, _before(steps, cause), cause)
+            trials.append((cause, fewer, tests_of(fewer[-1])))
+            if not _bears(tested, trials[-1][-1], LEAST_PRESENT):
+                return trials[-1]
+        return trials[0]
+
     while steps[-1].effects:
         tested = tested or tests_of(steps[-1])
         idle = {t.effect for t in tested if t.present < LEAST_BEARING} & bearing - released
@@ -102,22 +113,22 @@ def kept(
             steps, tested = good, []
             continue
         blurred = any(t.passes_beside_size and not t.certain for t in failed)
-        weakest = min(free if blurred else failed, key=lambda t: t.gain.mean)
-        before = [fit for fit in steps if weakest.effect not in fit.effects]
+        least_first = sorted(free if blurred else failed, key=lambda t: t.gain.mean)
         in_time = time.monotonic() < until
+        weakest, fewer, tests = least_missed(least_first[: _TRIED if in_time else 1])
         if in_time and weakest.effect not in replaced and len(steps[-1].effects) > 1:
             replaced.add(weakest.effect)
             other = _in_its_place(fitter, found, steps[-1], weakest, names)
-            tests = [] if other is None else tests_of(other)
-            if other is not None and tests[-1].passes_beside_size:
+            others = [] if other is None else tests_of(other)
+            if other is not None and others[-1].passes_beside_size:
                 replaced.add(other.effects[-1])
-                steps, tested = [*before, other], tests
+                steps, tested = [*_before(steps, weakest), other], others
                 continue
-        fewer = _taken_out(fitter, before, weakest)
-        tests = tests_of(fewer[-1])
         against_little = weakest.nearly_passes or weakest.gains_beside_size
         nearly = against_little and weakest.present >= LEAST_BEARING
-        if (guessed or nearly) and _bears(tested, tests):
+        unsure_alone = weakest.gains_beside_size and not guessed
+        least = LEAST_PRESENT if unsure_alone else SURE
+        if (guessed or nearly) and _bears(tested, tests, least):
             bearing.add(weakest.effect)
             continue
         passed = bool(guessed) and weakest.passed
@@ -217,15 +228,21 @@ def _taken_out(fitter: CellFitter, before: Sequence[CellFit], weakest: Tested) -
     return [*before[:-1], last if better else before[-1]]
 
 
-def _bears(tested: Sequence[Tested], without: Sequence[Tested]) -> bool:
-    """Tell whether a cause bears others: these are sure beside it, and not present without it.
+def _before(steps: Sequence[CellFit], cause: Tested) -> list[CellFit]:
+    """Return the steps that lack a cause."""
+    return [fit for fit in steps if cause.effect not in fit.effects]
+
+
+def _bears(tested: Sequence[Tested], without: Sequence[Tested], least: float = SURE) -> bool:
+    """Tell whether a cause bears others: these pass beside it, surely enough, and not without it.
 
     Args:
         tested: all causes.
         without: the others, tested without it.
+        least: how surely the others must be present beside it.
     """
-    sure = {t.effect for t in tested if t.present >= SURE}
-    return any(t.effect in sure and not t.passed for t in without)
+    beside = {t.effect for t in tested if t.passed and t.present >= least}
+    return any(t.effect in beside and not t.passed for t in without)
 
 
 def _begun_anew(fitter: CellFitter, fit: CellFit, before: CellFit) -> CellFit:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 from fjr_kit.telling import Progress
 
@@ -127,7 +128,22 @@ class Stepwise:
         return False
 
     def _singles(self, _: Sequence[CellFit], found: Found) -> list[CellFit]:
-        return self.extension.extended(found.best, found.steps)
+        fits = self.extension.extended(found.best, found.steps)
+        return self.extension.ranked([self._or_known(fit, found) for fit in fits], found.best)
+
+    def _or_known(self, fit: CellFit, found: Found) -> CellFit:
+        """Return a fit, or one of the same causes from an earlier step, if that does better.
+
+        What came together with others may have gone further than what is added after them.
+        """
+        tried = [f for fits in found.rivals.values() for f in fits]
+        known = [f for f in tried if {*f.effects} == {*fit.effects}]
+        better = [f for f in known if self._fitter.gains(f, fit).sum() > 0.0]
+        if not better:
+            return fit
+        best = max(better, key=lambda f: self._fitter.gains(f, fit).sum())
+        acts = self._fitter.acted(best, fit.effects[-1])
+        return replace(best, effects=fit.effects, acts=acts)
 
     def _less_promising(self, fits: Sequence[CellFit], found: Found) -> list[CellFit]:
         """Return fits of what promises less, where something great is not found yet."""
@@ -147,10 +163,12 @@ class Stepwise:
     def _frictions(self, fits: Sequence[CellFit], found: Found) -> list[CellFit]:
         """Return pairs of laws of friction, where most of what is missing goes with velocity.
 
-        Of a friction that falls from breakaway and then grows, neither law alone is much better.
+        Of a friction that falls from breakaway and then grows, neither law alone is much better;
+        nor is one where it falls and its bristles yield, since a joint stops and starts by both.
+        The datasheet that lacks friction lacks its form as well.
         """
         laws = [fit for fit in fits if fit.effects[-1] in FRICTION]
-        if not laws or not lacks_friction(self._fitter, found.best):
+        if not laws or not (self._lacked or lacks_friction(self._fitter, found.best)):
             return []
         others = [e for e in self.extension.effects if e not in FRICTION]
         return self._pairs(laws[:_PARENTS], found, others)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +22,7 @@ from gap_diagnosis.model.rig_model import Model
 from gap_diagnosis.outcome.diagnosis import Diagnosis
 from gap_diagnosis.outcome.gap_size import Estimate, Gaps
 from gap_diagnosis.report.gap_tables import parameters
+from gap_diagnosis.which import stepwise
 from gap_diagnosis.which.found import Found
 from gap_diagnosis.which.stepwise import Stepwise
 
@@ -83,6 +85,35 @@ def test_of_what_does_as_well_none_lacks_a_friction_that_repeats(fitter):
     assert extension._lacks_friction(one, both)
     assert not extension._lacks_friction(both, both)
     assert not extension._lacks_friction(both, one)
+
+
+def test_a_fit_of_an_earlier_step_stands_where_adding_a_cause_ends_elsewhere(fitter):
+    """Its causes are those of the step, in the order of the step."""
+    refit = fitter.refit()
+    search = Stepwise(fitter, BOTH)
+    fits = search.extension.extended(refit, [refit])
+    both = next(fit for fit in fits if {*fit.effects} == {*BOTH})
+    order = tuple(reversed(both.effects))
+    worse = replace(both, effects=order, left=3.0 * both.left)
+    known = search._or_known(worse, Found([refit], rivals={1: fits}))
+    assert known.model is both.model and known.effects == order
+    assert search._or_known(worse, Found([refit], rivals={1: [worse]})) is worse
+    others = [fit for fit in fits if {*fit.effects} != {*BOTH}]
+    assert search._or_known(worse, Found([refit], rivals={1: others})) is worse
+
+
+def test_laws_of_friction_are_paired_where_the_datasheet_lacks_friction(fitter, monkeypatch):
+    """Whether or not most of what is missing goes with velocity: a joint rests by them as well."""
+    refit, asked = fitter.refit(), []
+    search = Stepwise(fitter, [*BOTH, "stribeck_friction_motor", "presliding_friction", "cogging"])
+    added = [replace(refit, effects=(e,)) for e in ("stribeck_friction_motor", "cogging")]
+    monkeypatch.setattr(stepwise, "lacks_friction", lambda *_: False)
+    monkeypatch.setattr(search, "_pairs", lambda *given: asked.append(given) or added)
+    found = Found([refit])
+    assert search._frictions(added, found) == added
+    assert asked == [(added[:1], found, ["cogging"])]  # beside laws of friction, no others
+    monkeypatch.setattr(search, "_lacked", set())
+    assert search._frictions(added, found) == []
 
 
 def test_friction_that_is_lacked_is_fitted_whatever_its_start_promises(fitter):

@@ -296,6 +296,71 @@ def test_within_a_search_what_nearly_passes_stays_if_without_it_sure_causes_fail
     assert all(present <= LEAST_PRESENT for present in found.doubted.values())
 
 
+@pytest.mark.parametrize("in_time", [True, False])
+def test_of_causes_that_fail_that_goes_first_which_no_other_misses(
+    searched, tested, monkeypatch, in_time
+):
+    """What gains least may be what others cannot do without, and pass once a needless one went."""
+    fitter, fits = searched
+    sure = max(tested, key=lambda t: t.present)
+    needless, needed, other = "stribeck_friction_motor", "delay", "torque_bias"
+
+    def told(_fitter, fit, *_):
+        found = []
+        for effect in fit.effects:
+            one = replace(sure, effect=effect, without=fitter.without(fit, effect))
+            if effect == needless:
+                one = replace(one, gain=Gain(5.0, 4.0, 0.2, 0.6))
+            if effect == needed and needless in fit.effects:
+                one = replace(one, gain=Gain(2.0, 1.5, 0.2, 0.6))
+            if effect == other and needed not in fit.effects:
+                one = replace(one, certain=False, gain=Gain(0.1, 0.0, 0.2, 0.9))
+            found.append(one)
+        return found
+
+    monkeypatch.setattr(kept_causes_module, "causes_with_tests", told)
+    monkeypatch.setattr(kept_causes_module, "_in_its_place", lambda *_: None)
+    monkeypatch.setattr(kept_causes_module, "_twice", lambda *_: [])
+    until = math.inf if in_time else 0.0
+    found, _ = kept(fitter, Found(fits), SCATTER, lambda _: None, fits[-1].effects, until)
+    assert (set(found.best.effects) == {needed, other}) == in_time
+
+
+@pytest.mark.parametrize(
+    ("against", "stays"), [({}, True), ({"in_band": 0.1, "over_noise_closed": 0.1}, False)]
+)
+def test_what_repeats_but_is_not_sure_stays_where_what_passes_fails_without_it(
+    searched, tested, monkeypatch, against, stays
+):
+    fitter, fits = searched
+    sure = max(tested, key=lambda t: t.present)
+    small = replace(sure, share=replace_share(sure.share), left=0.5, beside_others=math.inf)
+    passing = replace(small, in_band=0.7, over_noise_closed=0.7)
+    unsure = replace(small, in_band=0.5, over_noise_closed=0.5, beside_others=0.0)
+    assert passing.passed and passing.present < SURE
+    assert unsure.gains_beside_size and LEAST_BEARING < unsure.present < LEAST_PRESENT
+
+    def told(_fitter, fit, *_):
+        found = []
+        for effect in fit.effects:
+            one = unsure if effect == "delay" else passing
+            one = replace(one, effect=effect, without=fitter.without(fit, effect))
+            if effect == "delay":
+                one = replace(one, **against)
+            if "delay" not in fit.effects:
+                one = replace(one, certain=False)
+            found.append(one)
+        return found
+
+    monkeypatch.setattr(kept_causes_module, "causes_with_tests", told)
+    monkeypatch.setattr(kept_causes_module, "_in_its_place", lambda *_: None)
+    monkeypatch.setattr(kept_causes_module, "_twice", lambda *_: [])
+    monkeypatch.setattr(kept_causes_module, "_guesses", lambda *_: [])
+    steps = [fits[0], fits[2], fits[3]]
+    found, _ = kept(fitter, Found(steps), SCATTER, lambda _: None, fits[-1].effects)
+    assert ("delay" in found.best.effects) is stays
+
+
 def test_what_nearly_passes_has_nothing_else_against_it(tested):
     sure = max(tested, key=lambda t: t.present)
     seldom = replace(sure, gain=Gain(5.0, 4.0, 0.7, 0.01))
@@ -388,7 +453,7 @@ def test_what_fails_again_and_again_ends(searched, monkeypatch):
 
     monkeypatch.setattr(kept_causes_module, "causes_with_tests", tests_of)
     monkeypatch.setattr(kept_causes_module, "_twice", lambda fitter, best, tested: list(tested))
-    monkeypatch.setattr(kept_causes_module, "_bears", lambda tested, without: True)
+    monkeypatch.setattr(kept_causes_module, "_bears", lambda *_: True)
     monkeypatch.setattr(kept_causes_module, "LEAST_BEARING", 0.0)
     found, tested = kept(fitter, Found(fits), SCATTER, lambda _: None, fits[-1].effects)
     assert len(tested) == len(found.best.effects) <= 2
@@ -408,7 +473,7 @@ def test_a_cause_whose_shape_blurs_its_size_stays_where_sure_ones_fail_without_i
         ]
 
     monkeypatch.setattr(kept_causes_module, "causes_with_tests", tests_of)
-    monkeypatch.setattr(kept_causes_module, "_bears", lambda tested, without: True)
+    monkeypatch.setattr(kept_causes_module, "_bears", lambda *_: True)
     monkeypatch.setattr(kept_causes_module, "_in_its_place", lambda *_: None)
     found, _ = kept(fitter, Found(fits[:3]), SCATTER, lambda _: None, fits[2].effects)
     assert (blurred in found.best.effects) is stays
@@ -500,7 +565,7 @@ def test_what_others_needed_goes_when_they_no_longer_do(searched, tested, monkey
     monkeypatch.setattr(kept_causes_module, "_in_its_place", lambda *_: None)
     monkeypatch.setattr(kept_causes_module, "_twice", lambda *_: [])
     monkeypatch.setattr(
-        kept_causes_module, "_bears", lambda tested, _: any(t.effect == bears for t in tested)
+        kept_causes_module, "_bears", lambda tested, *_: any(t.effect == bears for t in tested)
         and tested[0].effect == needless and len(tested) == 3,
     )  # fmt: skip
     found, left = kept(fitter, Found(fits), SCATTER, lambda _: None, fits[-1].effects)
