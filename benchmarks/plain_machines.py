@@ -23,12 +23,16 @@ from gap_diagnosis.any_record import diagnose
 from gap_diagnosis.outcome.diagnosis import Diagnosis
 
 ALSO = {"presliding_friction", "encoder_quantization"}  # in all of them
+FALLS, BRISTLES = "stribeck_friction_motor", "lugre_friction"  # one law of both
 
 
 def row(number: int, machine: Machine, found: Diagnosis, spent_s: float) -> str:
     """Return a line of the table."""
     there = {name.split(".")[0] for name, size in SIZES.items() if size in machine.truth}
     named = {e for cause in found.causes for e in (cause.effect, *cause.others)}
+    if BRISTLES in named and FALLS in there:
+        there.add(BRISTLES)
+        named.add(FALLS)
     wrong = [c.effect for c in found.causes if not {c.effect, *c.others} & (there | ALSO)]
     unit = machine.truth["inertia"] / found.parameters["jm"].value if machine.swings else 1.0
     ratios, inside = [], []

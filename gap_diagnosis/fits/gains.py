@@ -27,6 +27,7 @@ TIED_P = 0.1
 
 
 _FEW = 5  # parts: of fewer no rank test is sure
+_COARSE = 8  # parts: of fewer a rank test is not sure as soon as one loses more than the least gain
 _COUNTED = 5.0  # nats, the most that one of few parts counts
 _NEUTRAL = 0.02  # of the greatest gain of a part: parts that change by less say nothing
 NEARLY_ALL = 0.1
@@ -183,16 +184,21 @@ def _p_value(gains: np.ndarray) -> float:
     By Wilcoxon's signed-rank test. An effect that acts in few parts, such as a limit that is
     reached twice, cannot pass that however much these gain: all of them must gain then, and the
     likelihood ratio on unseen parts, to which each adds a bounded amount, is an e-value, whose
-    inverse bounds the p-value (Vovk, Wang 2021, Annals of Statistics 49(3)).
+    inverse bounds the p-value (Vovk, Wang 2021, Annals of Statistics 49(3)). Of a few parts more
+    one may lose, by chance of where friction stops the motion, and by more than another gains: the
+    same ratio, of which a loss counts whole, then lets the others pass, but no more surely than
+    they must.
 
     Args:
         gains: of log-likelihood, nats.
     """
-    if gains.size >= _FEW:
-        return float(stats.wilcoxon(gains, alternative="greater").pvalue)
-    if gains.min() <= 0.0:
-        return 1.0
-    return float(np.exp(-np.minimum(gains, _COUNTED).sum()))
+    of_ratio = float(np.exp(-np.minimum(gains, _COUNTED).sum()))
+    if gains.size < _FEW:
+        return of_ratio if gains.min() > 0.0 else 1.0
+    of_ranks = float(stats.wilcoxon(gains, alternative="greater").pvalue)
+    if gains.size >= _COARSE or np.sum(gains <= 0.0) > 1:
+        return of_ranks
+    return min(of_ranks, max(of_ratio, MOST_P))
 
 
 def stands_for(

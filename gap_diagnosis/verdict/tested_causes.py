@@ -141,6 +141,11 @@ class Tested:
         return self._well_known and (self._closes or self.gain.present)
 
     @property
+    def gains_more_often(self) -> bool:
+        """Whether it gains where more changes than where it loses, however many parts that are."""
+        return self._well_known and self.gain.share > 0.5
+
+    @property
     def _well_known(self) -> bool:
         gains = self.gain.mean > LEAST_GAIN and self.bounded is None
         return gains and self.certain and self.invariant
