@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from functools import cache
 
@@ -17,7 +18,7 @@ from fjr_sim_node.simulation.closed_loop import simulate
 from gap_diagnosis.fits import unseen_friction
 from gap_diagnosis.fits.cell_fits import CellFitter
 from gap_diagnosis.fits.cell_weights import independent
-from gap_diagnosis.fits.gains import Gain, closed, fall, gain
+from gap_diagnosis.fits.gains import MOST_P, Gain, _p_value, closed, fall, gain
 from gap_diagnosis.gates.bag_deviations import GROUPS
 from gap_diagnosis.model.evidence import Evidence
 from gap_diagnosis.model.rig_model import Model
@@ -292,6 +293,30 @@ def test_a_gain_by_one_part_or_one_that_does_not_repeat_is_no_presence():
     assert not Gain(mean=10.0, without_best=8.0, share=0.6, p=0.002).present
     assert not Gain(mean=10.0, without_best=8.0, share=1.0, p=0.2).present
     assert not Gain(mean=0.5, without_best=0.4, share=1.0, p=0.002).present
+
+
+@pytest.mark.parametrize(
+    ("gains", "p"),
+    [
+        ([5.4, -5.5, 28.4, 4.7, 16.6, 23.1], MOST_P),  # by ranks alone 5 of 64
+        ([5.4, 5.5, 28.4, 4.7, 16.6, 23.1], 1 / 64),
+        ([5.4, -22.0, 28.4, 4.7, 16.6, 23.1], math.exp(-2.7)),  # a loss counts whole
+        ([5.4, -1.5, 28.4, -1.7, 16.6, 23.1], 5 / 64),
+        ([5.4, -5.5, 28.4, -4.7, 16.6, 23.1], 7 / 64),  # two lose
+        ([5.4, -5.5, 28.4, 16.6], 1.0),
+    ],
+)
+def test_of_few_parts_one_may_lose_where_the_others_gain_much(gains, p):
+    assert _p_value(np.array(gains)) == pytest.approx(p)
+
+
+def test_parts_whose_gains_are_chance_pass_as_seldom_as_they_must():
+    """Log-likelihood ratios of a normal that is off against the true one, on 5 to 7 parts."""
+    rng = np.random.default_rng(3)
+    for parts in (5, 6, 7):
+        seen = 2.0 * rng.standard_normal((400, parts)) - 2.0  # off by two standard deviations
+        passed = [_p_value(row) <= MOST_P for row in seen]
+        assert np.mean(passed) <= MOST_P
 
 
 def test_nothing_is_gained_by_an_effect_that_is_not_there():
