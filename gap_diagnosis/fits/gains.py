@@ -192,7 +192,7 @@ def _p_value(gains: np.ndarray) -> float:
     Args:
         gains: of log-likelihood, nats.
     """
-    of_ratio = float(np.exp(-np.minimum(gains, _COUNTED).sum()))
+    of_ratio = math.exp(min(-float(np.minimum(gains, _COUNTED).sum()), 0.0))
     if gains.size < _FEW:
         return of_ratio if gains.min() > 0.0 else 1.0
     of_ranks = float(stats.wilcoxon(gains, alternative="greater").pvalue)

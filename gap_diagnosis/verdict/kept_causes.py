@@ -188,7 +188,7 @@ class _Keeping:
         return causes_with_tests(self._fitter, fit, self._kept.steps[0], self._scatter)
 
     def _failing(self, tested: Sequence[Tested]) -> tuple[list[Tested], bool]:
-        """Return the causes that may go, what gains least first; whether they pass unsurely."""
+        """Return the causes that may go, in what order; and whether they pass but are not sure."""
         weak = {t.effect for t in tested if t.present < LEAST_BEARING}
         idle = weak & self._bearing - self._released - self._restored
         self._bearing, self._released = self._bearing - idle, self._released | idle
@@ -201,8 +201,11 @@ class _Keeping:
         if not failed:
             failed = _without(stay, _guesses(tested, self._lacking))
             guessed = bool(failed)
-        blurred = any(t.passes_beside_size and not t.certain for t in failed)
-        return sorted(free if blurred else failed, key=lambda t: t.gain.mean), guessed
+        causes = sorted(failed, key=lambda t: t.gain.mean)
+        if any(t.passes_beside_size and not t.certain for t in failed):  # blurred by another one
+            least = min(free, key=lambda t: t.gain.mean)
+            causes = [least, *(t for t in causes if t is not least)]
+        return causes, guessed
 
     def _least_missed(self, causes: Sequence[Tested]) -> tuple[Tested, list[CellFit], list[Tested]]:
         """Return the first cause without which no other fails, or the very first; steps, tests."""

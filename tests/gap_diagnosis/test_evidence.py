@@ -304,6 +304,7 @@ def test_a_gain_by_one_part_or_one_that_does_not_repeat_is_no_presence():
         ([5.4, -1.5, 28.4, -1.7, 16.6, 23.1], 5 / 64),
         ([5.4, -5.5, 28.4, -4.7, 16.6, 23.1], 7 / 64),  # two lose
         ([5.4, -5.5, 28.4, 16.6], 1.0),
+        ([-800.0, -9e3, 1.0, 2.0, 3.0, -7.0], 54 / 64),
     ],
 )
 def test_of_few_parts_one_may_lose_where_the_others_gain_much(gains, p):
