@@ -24,18 +24,22 @@ def partners(found: Sequence[str], among: set[str], nominal: Mapping[str, float]
     return sorted(among & (alike | set(found)))
 
 
-def holders(found: Sequence[str], among: Sequence[str]) -> list[str]:
+def holders(found: Sequence[str], among: Sequence[str], beside: Collection[str]) -> list[str]:
     """Return what holds one of some effects as a limit case and is not looked for by itself.
 
     A law of several parts, such as LuGre friction, is too costly to be tried on every rig, and not
     needed where one of its parts does as well; where one leads, the whole may be what is there.
+    Beside one of its parts it would name that one twice: there the other part is what is looked
+    for.
 
     Args:
         found: identifiers of what leads.
         among: what is looked for; a law counts where all its parts are.
+        beside: identifiers of the explanation to which it is to be added.
     """
     every = {other for effect in found for other in fx.holders(effect)} - set(among)
-    return sorted(e for e in every if set(fx.EFFECTS[e].contains) <= set(among))
+    parts = {law: set(fx.EFFECTS[law].contains) for law in every}
+    return sorted(law for law in every if parts[law] <= set(among) - set(beside))
 
 
 def founded(

@@ -69,7 +69,8 @@ class Extension:
         proposals = self._proposed(parent, screened, _PROPOSED[later])
         ordered = sorted((e for e in proposals if proposals[e]), key=lambda e: proposals[e][0][0])
         chosen = self._worth_a_fit(parent, proposals, ordered[: _FITTED[later]])
-        held = founded(holders(chosen[:2], names), parent.effects, nominal, names)
+        held = holders(chosen[:2], names, parent.effects)
+        held = founded(held, parent.effects, nominal, names)
         alike = {
             *partners(chosen[:2], set(effects), nominal),
             *held,

@@ -23,6 +23,7 @@ from gap_diagnosis.outcome.diagnosis import Diagnosis
 from gap_diagnosis.outcome.gap_size import Estimate, Gaps
 from gap_diagnosis.report.gap_tables import parameters
 from gap_diagnosis.which import stepwise
+from gap_diagnosis.which.equivalents import holders
 from gap_diagnosis.which.found import Found
 from gap_diagnosis.which.stepwise import Stepwise
 
@@ -114,6 +115,15 @@ def test_laws_of_friction_are_paired_where_the_datasheet_lacks_friction(fitter, 
     assert asked == [(added[:1], found, ["cogging"])]  # beside laws of friction, no others
     monkeypatch.setattr(search, "_lacked", set())
     assert search._frictions(added, found) == []
+
+
+def test_a_law_of_several_parts_is_not_tried_beside_one_of_them():
+    """It would name that part twice; what it has beyond it is an effect of its own."""
+    names = [*BOTH, "stribeck_friction_motor", "presliding_friction"]
+    for part, other in (names[2:], names[:1:-1]):
+        assert holders([part], names, BOTH) == ["lugre_friction"]
+        assert holders([part], names, [*BOTH, other]) == []
+        assert holders([part], [*BOTH, part], BOTH) == []
 
 
 def test_friction_that_is_lacked_is_fitted_whatever_its_start_promises(fitter):
