@@ -83,7 +83,7 @@ def with_the_better_one(
     gains = [
         (gain(fitter, fit, best), effect, fit) for effect, fits in tied.items() for fit in fits
     ]
-    surely = [one for one in gains if one[0].present]
+    surely = [one for one in gains if one[0].surely_present]
     if not surely:
         return None
     _, effect, fit = max(surely, key=lambda one: one[0].mean)
