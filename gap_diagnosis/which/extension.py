@@ -157,7 +157,7 @@ class Extension:
         further = {*richer.effects} - {*fit.effects}
         if not {*fit.effects} < {*richer.effects} or not further & {*FRICTION}:
             return False
-        return self.gain(richer, fit).present
+        return self.gain(richer, fit).surely_present
 
     def ranked(self, fits: Sequence[CellFit], parent: CellFit) -> list[CellFit]:
         """Return fits by what they gain over their parent, the best first."""
