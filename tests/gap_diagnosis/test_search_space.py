@@ -98,7 +98,7 @@ def test_ripples_are_those_that_the_motion_can_show(scales, slow):
     assert cycles[0] == pytest.approx(max(0.25 * 2.0 * math.pi / travelled, 0.02), rel=0.05)
     step = cycles[1] - cycles[0]
     assert 0.0 < step * scales.angle_rad <= 0.5 * (1 + 1e-9)
-    assert np.diff(cycles) == pytest.approx(np.full(cycles.size - 1, step), rel=1e-6)
+    np.testing.assert_allclose(np.diff(cycles), step, rtol=1e-6)  # of up to half a million
     sampled = 2.0 * math.pi / (3.0 * scales.period_s * min(slow, 1.0) * scales.velocity_rad_s)
     assert cycles[-1] <= max(sampled, 4.0 * cycles[0]) * (1 + 1e-9)
     assert cycles[-1] >= min(0.9 * sampled, 8e5) or cycles.size > 400_000
