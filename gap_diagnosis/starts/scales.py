@@ -159,7 +159,7 @@ class Scales:
         """
         low = max(_QUARTER_CYCLE / self.angle_rad, 0.02)
         sampled = 2.0 * np.pi / (3.0 * self.period_s)
-        usual = max(sampled / self.velocity_rad_s, 4.0 * low)
+        usual = min(max(sampled / self.velocity_rad_s, 4.0 * low), _FINEST_CYCLES)
         high = max(min(sampled / self.slow_rad_s, _FINEST_CYCLES), usual)
         step = max((usual - low) / _FEW_CYCLES, _FINE / self.angle_rad)
         step = min(step, _COARSE / self.angle_rad)

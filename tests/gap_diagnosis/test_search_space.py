@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from fjr_sim_node import effects as fx
@@ -90,6 +90,7 @@ def test_the_gap_of_a_transmission_is_sought_in_its_deflection_not_in_the_motion
 
 
 @given(any_scales(), st.floats(0.01, 2.0))
+@example(replace(PAPER_LIKE, velocity_rad_s=1e-3, angle_rad=0.1), 1.0)  # 2e6 by its samples
 def test_ripples_are_those_that_the_motion_can_show(scales, slow):
     """Down to a few in its slow stretches, in even steps that a fit can bridge."""
     scales = replace(scales, slow_rad_s=slow * scales.velocity_rad_s)
