@@ -121,12 +121,13 @@ def moved(
                 waiting[runs % waiting.size] = asked
                 runs += 1
                 torque = waiting[runs % waiting.size]
-            load = gravity * np.sin(angle) + ripple * np.sin(cycles * angle + 1.0)
+            load = gravity * np.sin(angle)
+            held = load + ripple * np.sin(cycles * angle + 1.0)
             level = coulomb + breakaway * np.exp(-((speed / fallen) ** 2)) + of_load * abs(load)
             ends = touch if speed >= 0.0 else -touch
             bristle = ends + (bristle - ends) * np.exp(-abs(speed) * dt / touch)
             lost = level * bristle / touch + viscous * speed + quadratic * abs(speed) * speed
-            speed += dt * (torque + pushed[k] - lost - load) / inertia
+            speed += dt * (torque + pushed[k] - lost - held) / inertia
             angle += dt * speed
             found[1, k] += torque / inner
     return found

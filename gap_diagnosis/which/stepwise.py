@@ -138,10 +138,9 @@ class Stepwise:
         """
         tried = [f for fits in found.rivals.values() for f in fits]
         known = [f for f in tried if {*f.effects} == {*fit.effects}]
-        better = [f for f in known if self._fitter.gains(f, fit).sum() > 0.0]
-        if not better:
+        best = max(known, key=lambda f: self._fitter.gains(f, fit).sum(), default=fit)
+        if not self._fitter.gains(best, fit).sum() > 0.0:
             return fit
-        best = max(better, key=lambda f: self._fitter.gains(f, fit).sum())
         acts = self._fitter.acted(best, fit.effects[-1])
         return replace(best, effects=fit.effects, acts=acts)
 

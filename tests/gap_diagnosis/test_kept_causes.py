@@ -65,6 +65,13 @@ def tested(searched):
     return tuple(causes_with_tests(fitter, fits[3], fits[0], SCATTER))
 
 
+def judged_by(monkeypatch, told) -> None:
+    """Have causes tested by a function, and nothing tried in their place or named twice."""
+    monkeypatch.setattr(kept_causes_module, "causes_with_tests", told)
+    monkeypatch.setattr(kept_causes_module, "in_its_place", lambda *_: None)
+    monkeypatch.setattr(kept_causes_module, "twice", lambda *_: [])
+
+
 def test_what_is_left_after_a_first_cause_was_taken_out_is_shown_cause_after_cause(searched):
     fitter, fits = searched
     found, tested = kept(fitter, Found(fits), SCATTER, lambda _: None, fits[-1].effects)
@@ -286,9 +293,7 @@ def test_within_a_search_what_nearly_passes_stays_if_without_it_sure_causes_fail
             found.append(one if whole or not breaks else replace(one, certain=False))
         return found
 
-    monkeypatch.setattr(kept_causes_module, "causes_with_tests", told)
-    monkeypatch.setattr(kept_causes_module, "in_its_place", lambda *_: None)
-    monkeypatch.setattr(kept_causes_module, "twice", lambda *_: [])
+    judged_by(monkeypatch, told)
     found, left = kept(fitter, Found(fits), SCATTER, lambda _: None, fits[-1].effects)
     assert {t.effect for t in left} == set(found.best.effects) == kept_causes
     assert set(found.doubted) == set(fits[-1].effects) - kept_causes
@@ -323,9 +328,7 @@ def test_of_causes_that_fail_that_goes_first_which_no_other_misses(
             found.append(one)
         return found
 
-    monkeypatch.setattr(kept_causes_module, "causes_with_tests", told)
-    monkeypatch.setattr(kept_causes_module, "in_its_place", lambda *_: None)
-    monkeypatch.setattr(kept_causes_module, "twice", lambda *_: [])
+    judged_by(monkeypatch, told)
     monkeypatch.setattr(kept_causes_module, "_TOGETHER", together)
     until = math.inf if in_time else 0.0
     found, _ = kept(fitter, Found(fits), SCATTER, lambda _: None, fits[-1].effects, until)
@@ -358,9 +361,7 @@ def test_what_repeats_but_is_not_sure_stays_where_what_passes_fails_without_it(
             found.append(one)
         return found
 
-    monkeypatch.setattr(kept_causes_module, "causes_with_tests", told)
-    monkeypatch.setattr(kept_causes_module, "in_its_place", lambda *_: None)
-    monkeypatch.setattr(kept_causes_module, "twice", lambda *_: [])
+    judged_by(monkeypatch, told)
     monkeypatch.setattr(kept_causes_module, "_guesses", lambda *_: [])
     monkeypatch.setattr(kept_causes_module, "_TOGETHER", 0.0)
     steps = [fits[0], fits[2], fits[3]]
@@ -568,9 +569,7 @@ def test_what_others_needed_goes_when_they_no_longer_do(searched, tested, monkey
             found.append(one)
         return found
 
-    monkeypatch.setattr(kept_causes_module, "causes_with_tests", told)
-    monkeypatch.setattr(kept_causes_module, "in_its_place", lambda *_: None)
-    monkeypatch.setattr(kept_causes_module, "twice", lambda *_: [])
+    judged_by(monkeypatch, told)
     monkeypatch.setattr(
         kept_causes_module, "_bears", lambda tested, *_: any(t.effect == bears for t in tested)
         and tested[0].effect == needless and len(tested) == 3,
