@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..model.rig_model import Model
+from ..outcome.cause import LEAST_PRESENT
 from ..outcome.cause_words import (
     choice_sentences,
     evidence_sentences,
@@ -37,10 +38,22 @@ def outcome_values(diagnosis: Diagnosis) -> dict[str, Any]:
         "contenders": contenders(diagnosis),
         "choice": choice_sentences(diagnosis),
         "shares": share_sentences(diagnosis),
-        "tested_causes": any(cause.where for cause in diagnosis.causes),
+        "causes_caption": caption(diagnosis),
         "remainder": remainder_sentences(diagnosis),
         "evidence": evidence_sentences(diagnosis.evidence) if diagnosis.evidence else [],
     }
+
+
+def caption(diagnosis: Diagnosis) -> str:
+    """Return what stands over the table of causes."""
+    if not any(cause.where for cause in diagnosis.causes):
+        return "Named causes."
+    if all(cause.present >= LEAST_PRESENT for cause in diagnosis.causes):
+        return "Causes that passed every test, greatest share first."
+    return (
+        f"Causes, greatest share first. What is present at less than {LEAST_PRESENT:.0%} did not "
+        "pass every test; it stays since others fail without it, or since every joint has it."
+    )
 
 
 def outcome_plots(diagnosis: Diagnosis) -> dict[str, Any]:

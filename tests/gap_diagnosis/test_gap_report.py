@@ -30,6 +30,7 @@ from gap_diagnosis.outcome.diagnosis import Diagnosis, NextExperiment
 from gap_diagnosis.outcome.verdict_words import WORDS
 from gap_diagnosis.report.gap_output import write_diagnosis
 from gap_diagnosis.report.gap_report import compared, render_gap_report
+from gap_diagnosis.report.outcome_values import caption
 from gap_diagnosis.report.updated_parameters import updated_values
 from gap_diagnosis.report.waterfall import bars, draw_waterfall, waterfall_plot
 
@@ -166,6 +167,16 @@ def test_causes_and_evidence_are_said(page):
     text = " ".join(" ".join(page.texts).split())
     assert "backlash or piecewise stiffness 90%" in text
     assert "Steady periods were compared. The controller is known" in text
+
+
+def test_causes_that_did_not_pass_every_test_are_not_said_to_have_passed(found):
+    passed = found.diagnosis
+    assert caption(passed).startswith("Causes that passed every test")
+    first, *others = passed.causes
+    unsure = [first.model_copy(update={"present": 0.18}), *others]
+    told = caption(passed.model_copy(update={"causes": unsure}))
+    assert "less than 50% did not pass every test" in told
+    assert caption(passed.model_copy(update={"causes": []})) == "Named causes."
 
 
 def test_each_cause_is_shown_over_the_quantity_of_its_telltale(page, found):
