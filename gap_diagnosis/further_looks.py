@@ -21,7 +21,7 @@ from .verdict.notes import MASSES_AND_SPRING, at_limits
 WIDER, CLOSER = 5.0, 0.2
 """How many tolerances a further look takes for one."""
 _HALF = 0.5  # of the misfit: what leaves less does clearly better
-_LESS = 0.7  # the same where only friction or stiffness is added that the datasheet lacks
+_LESS = 0.7  # the same where nothing is added, or friction or stiffness that the datasheet lacks
 _ALIKE = 1.2  # times the misfit: what leaves less does about as well
 _COMMON = 0.2  # range of the logarithms of ratios to the datasheet, within which one gain holds all
 
@@ -74,8 +74,8 @@ def says_more(
     if len(second.effects) < len(first.effects):
         return left[0] <= _ALIKE * left[1]
     adds = set(second.effects) - set(first.effects)
-    lacked = set(first.effects) < set(second.effects) and not adds & set(_beside(second))
-    return left[0] < (_LESS if lacked else _HALF) * left[1]
+    only_lacked = set(first.effects) <= set(second.effects) and not adds & set(_beside(second))
+    return left[0] < (_LESS if only_lacked else _HALF) * left[1]
 
 
 def said(second: Diagnosis, nominal: Mapping[str, float], tolerance: float, times: float) -> str:

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from fjr_kit.telling import Progress
-from fjr_sim_node import effects as fx
 
 from ..fits.cell_fits import CellFitter
 from ..fits.comparison import CellFit
@@ -21,15 +20,12 @@ from ..which.found import Found
 from .judgement import FEWEST_PARTS
 from .named_twice import twice
 from .not_named import beyond_named, unsure, why_not
+from .passed_over import beside, passed_over
 from .spoiling import spoils, unspoiled
+from .staying import LEAST_BEARING, SURE, bases_of, bears, guesses, lacked_frictions, with_borne
 from .taken_out import in_its_place, one_by_one, taken_out
 from .tested_causes import Tested, causes_with_tests
 
-_MAY_BE_UNSURE = 2
-SURE = 0.8
-"""How surely a cause beyond the two that gain most must be present."""
-LEAST_BEARING = 0.2
-"""How surely a cause must be there that stays only because sure ones fail without it."""
 _TRIED = 3  # of the causes that fail, those that gain least, one of which others do not miss
 _TOGETHER = 0.5  # of the squared error: causes that leave less of it are there, if not each surely
 
@@ -41,7 +37,8 @@ class _Kept:
     Attributes:
         steps: of the search, without these causes.
         tested: the causes of the last step; empty where they are not tested yet.
-        notes: sentences on what has gone.
+        notes: sentences of the search, and on what spoils.
+        why_not: sentences on what has gone, by its identifier.
         doubted: how surely what has gone is present nevertheless.
         nearly_named: of that, what passed but is not sure.
     """
@@ -49,6 +46,7 @@ class _Kept:
     steps: list[CellFit]
     tested: list[Tested]
     notes: list[str]
+    why_not: dict[str, list[str]] = field(default_factory=dict)
     doubted: dict[str, float] = field(default_factory=dict)
     nearly_named: frozenset[str] = frozenset()
 
@@ -71,7 +69,7 @@ class _Kept:
         present = min(cause.present, 1.0 if passed else LEAST_PRESENT)
         return replace(
             self,
-            notes=[*self.notes, *why_not(cause)],
+            why_not={**self.why_not, cause.effect: why_not(cause)},
             doubted={**self.doubted, cause.effect: present},
             nearly_named=self.nearly_named | ({cause.effect} if passed else set()),
         )
@@ -97,6 +95,7 @@ def kept(
     is lost where the fit lacks what it acts beside. Friction that the datasheet lacks stays unless
     something is against it: without it all else would bend to do what it does. Where what has gone
     closes most of what is left, and repeats, only not each by itself, what others missed stays.
+    What was passed over for the sake of a cause that has gone is added if all pass beside it.
 
     Of causes that spoil the runs which report none is kept, and none at all where too little is
     held out.
@@ -114,14 +113,18 @@ def kept(
     """
     if len(fitter.evidence.parts_for("select")) < FEWEST_PARTS:
         return replace(found, steps=found.steps[:1]), []
-    left = _Keeping(fitter, found, scatter, progress, names, until).run()
+    keeping = _Keeping(fitter, found, scatter, progress, names, until)
+    left = keeping.run()
     steps, tested = left.steps, left.tested
     doubted = {e: p for e, p in left.doubted.items() if e not in left.best.effects}
-    notes = left.notes + unsure({e: p for e, p in doubted.items() if e in left.nearly_named})
+    notes = left.notes + [s for e in doubted for s in left.why_not.get(e, [])]
+    notes += unsure({e: p for e, p in doubted.items() if e in left.nearly_named})
     notes += beyond_named(fitter, found.best, left.best, doubted)
     if tested and any(len(fit.effects) != count for count, fit in enumerate(steps)):
         steps = [steps[0], *one_by_one(fitter, left.best, tested)]
-    return replace(found, steps=steps, notes=tuple(notes), doubted=doubted), _bearing(tested)
+    alike = {**found.alternatives, **keeping.taken_up}
+    told = replace(found, steps=steps, notes=tuple(notes), doubted=doubted, alternatives=alike)
+    return told, with_borne(tested)
 
 
 class _Keeping:
@@ -148,6 +151,9 @@ class _Keeping:
         self._released: set[str] = set()  # ...until these have gone...
         self._restored: set[str] = set()  # ...unless the fit is much worse without all of them
         self._missed: list[tuple[str, _Kept]] = []
+        self._passed_over: list[str] = []
+        self._seen: set[frozenset[str]] = set()  # sets of causes that were tested
+        self.taken_up: dict[str, list[str]] = {}  # of that, with what else was passed over
 
     def run(self) -> _Kept:
         """Return what is kept in the end."""
@@ -161,18 +167,19 @@ class _Keeping:
         kept = self._kept = replace(kept, tested=kept.tested or self._tests_of(kept.best))
         causes, guessed = self._failing(kept.tested)
         if not causes:
-            return self._brings_back() or self._spoils()
+            return self._brings_back() or self._takes_up() or self._spoils()
         cause, fewer, tests = self._least_missed(causes[: _TRIED if self._in_time else 1])
         if self._replaces(cause):
             return True
         against_little = cause.nearly_passes or cause.gains_beside_size
         nearly = against_little and cause.present >= LEAST_BEARING
         least = LEAST_PRESENT if cause.gains_beside_size and not guessed else SURE
-        if (guessed or nearly) and _bears(kept.tested, tests, least):
+        if (guessed or nearly) and bears(kept.tested, tests, least):
             self._bearing.add(cause.effect)
             return True
-        if cause.gains_more_often and _bears(kept.tested, tests, LEAST_PRESENT):
+        if cause.gains_more_often and bears(kept.tested, tests, LEAST_PRESENT):
             self._missed.append((cause.effect, kept))
+        self._passed_over += passed_over(self._fitter, self._found, kept.best, cause.effect)
         left = kept.without(cause, passed=guessed and cause.passed)
         self._kept = replace(left, steps=fewer, tested=tests)
         return True
@@ -185,6 +192,7 @@ class _Keeping:
         if not fit.effects:
             return []
         self._progress(f"tests of {' + '.join(fit.effects)}")
+        self._seen.add(frozenset(fit.effects))
         return causes_with_tests(self._fitter, fit, self._kept.steps[0], self._scatter)
 
     def _failing(self, tested: Sequence[Tested]) -> tuple[list[Tested], bool]:
@@ -193,13 +201,13 @@ class _Keeping:
         idle = weak & self._bearing - self._released - self._restored
         self._bearing, self._released = self._bearing - idle, self._released | idle
         fitter, names = self._fitter, self._names
-        bases, frictions = _bases(fitter, tested, names), _lacked(self._lacking, tested)
+        bases, frictions = bases_of(fitter, tested, names), lacked_frictions(self._lacking, tested)
         stay = {*self._bearing, *bases, *frictions}
         free, guessed = _without(stay, tested), False
         failed = [t for t in free if not t.passed]
         failed = failed or _without(stay, twice(fitter, self._kept.best, tested))
         if not failed:
-            failed = _without(stay, _guesses(tested, self._lacking))
+            failed = _without(stay, guesses(tested, self._lacking))
             guessed = bool(failed)
         causes = sorted(failed, key=lambda t: t.gain.mean)
         if any(t.passes_beside_size and not t.certain for t in failed):  # blurred by another one
@@ -213,7 +221,7 @@ class _Keeping:
         for cause in causes:
             fewer = taken_out(self._fitter, self._kept.before(cause), cause)
             trials.append((cause, fewer, self._tests_of(fewer[-1])))
-            if not _bears(self._kept.tested, trials[-1][-1], LEAST_PRESENT):
+            if not bears(self._kept.tested, trials[-1][-1], LEAST_PRESENT):
                 return trials[-1]
         return trials[0]
 
@@ -242,6 +250,27 @@ class _Keeping:
                 return True
         return False
 
+    def _takes_up(self) -> bool:
+        """Add what was passed over for the sake of a cause that has gone, if all pass beside it.
+
+        Then what has gone may pass as well. No set of causes is tested again.
+        """
+        kept = self._kept
+        gone = kept.doubted if self.taken_up else ()
+        over = [e for e in dict.fromkeys((*self._passed_over, *gone)) if e in self._names]
+        if not self.taken_up:
+            over = [e for e in over if e not in kept.doubted]
+        for effect in founded(over, kept.best.effects, self._fitter.nominal, self._names):
+            if frozenset((*kept.best.effects, effect)) in self._seen or not self._in_time:
+                continue
+            fit = beside(self._fitter, kept.best, effect)
+            tested = [] if fit is None else self._tests_of(fit)
+            if fit is not None and all(t.passed for t in tested):
+                self._kept = replace(kept, steps=[*kept.steps, fit], tested=tested)
+                self.taken_up[effect] = over
+                return True
+        return False
+
     def _spoils(self) -> bool:
         """Take away the causes that spoil the runs which report, if any does."""
         kept = self._kept
@@ -255,65 +284,3 @@ class _Keeping:
 
 def _without(names: set[str], tested: Sequence[Tested]) -> list[Tested]:
     return [t for t in tested if t.effect not in names]
-
-
-def _bases(fitter: CellFitter, tested: Sequence[Tested], names: Sequence[str]) -> set[str]:
-    """Return the causes that others modify which pass, where the datasheet lacks them.
-
-    Left alone, what modifies one would bend to stand in for it (see `founded`): friction that falls
-    from breakaway becomes the whole friction, with a velocity that is not its own.
-    """
-    passed = [t.effect for t in tested if t.passed]
-    return {
-        t.effect
-        for t in tested
-        if t.certain and t.invariant
-        for e in passed
-        if fx.EFFECTS[e].modifies == t.effect and not founded([e], (), fitter.nominal, names)
-    }
-
-
-def _bearing(tested: Sequence[Tested]) -> list[Tested]:
-    """Return the causes with the presence of those that modify them, where that is greater."""
-    return [
-        replace(
-            t,
-            borne=max(
-                (o.present for o in tested if fx.EFFECTS[o.effect].modifies == t.effect),
-                default=0.0,
-            ),
-        )
-        for t in tested
-    ]
-
-
-def _lacked(lacking: Collection[str], tested: Sequence[Tested]) -> set[str]:
-    """Return the frictions that the datasheet lacks and every joint has, which may well be there.
-
-    They are told with how sure they are; of few parts hardly any cause repeats surely.
-    """
-    there = [t for t in tested if t.known_though_it_drifts and t.present >= LEAST_BEARING]
-    return {t.effect for t in there if t.effect in lacking}
-
-
-def _bears(tested: Sequence[Tested], without: Sequence[Tested], least: float = SURE) -> bool:
-    """Tell whether a cause bears others: these pass beside it, surely enough, and not without it.
-
-    Args:
-        tested: all causes.
-        without: the others, tested without it.
-        least: how surely the others must be present beside it.
-    """
-    beside = {t.effect for t in tested if t.passed and t.present >= least}
-    return any(t.effect in beside and not t.passed for t in without)
-
-
-def _guesses(tested: Sequence[Tested], lacking: Collection[str] = ()) -> list[Tested]:
-    """Return the causes beyond the two that gain most of which one is not sure.
-
-    Each step tries the whole catalogue on what is left; the more steps, the likelier one of them
-    finds what resembles a part of the remainder. Friction that the datasheet lacks is no guess.
-    """
-    found = [t for t in tested if t.effect not in lacking]
-    further = sorted(found, key=lambda t: -t.gain.mean)[_MAY_BE_UNSURE:]
-    return [t for t in further if t.present < SURE]

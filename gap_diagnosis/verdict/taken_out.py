@@ -12,9 +12,8 @@ from ..fits.comparison import CellFit
 from ..fits.gains import gain, stands_for
 from ..which.equivalents import founded, partners
 from ..which.found import Found
+from .passed_over import beside, passed_over
 from .tested_causes import Tested
-
-_RIVALS = 3  # that did best when a cause was chosen, one of which may take its place
 
 
 def in_its_place(
@@ -22,21 +21,11 @@ def in_its_place(
 ) -> CellFit | None:
     """Return the best fit with another effect in the place of one; None if none does as well."""
     effect, without = tested.effect, tested.without
-    chosen = [
-        (gain(fitter, fit, found.steps[0]).mean, fit.effects[-1])
-        for fits in found.rivals.values()
-        for fit in fits
-        if fit.effects[:-1] == best.effects[: best.effects.index(effect)]
-    ]
     near = [*partners([effect], set(names), fitter.nominal), fx.EFFECTS[effect].modifies]
-    near += [name for _, name in sorted(chosen, reverse=True)[:_RIVALS]]
+    near += passed_over(fitter, found, best, effect)
     others = [e for e in dict.fromkeys(near) if e in names and e not in best.effects]
-    fits = []
-    for other in founded(others, without.effects, fitter.nominal, names):
-        proposals = fitter.screening(without, other).proposals()
-        fit = fitter.add(without, other, proposals) if proposals else None
-        if fit is not None and gain(fitter, fit, without).present:
-            fits.append(fitter.further(fit))
+    tried = founded(others, without.effects, fitter.nominal, names)
+    fits = [fit for other in tried if (fit := beside(fitter, without, other)) is not None]
     if not fits:
         return None
     most = max(fits, key=lambda fit: gain(fitter, fit, without).mean)

@@ -81,6 +81,9 @@ def test_a_wider_datasheet_must_not_need_more_causes_nor_end_at_a_limit(case):
     lacking = ["delay", "viscous_friction"]
     assert says_more(told(lacking, 60.0), first, nominal, WIDER)
     assert not says_more(told(lacking, 80.0), first, nominal, WIDER)
+    # the same causes explain more where the datasheet is taken for further off
+    assert says_more(told(["delay"], 60.0), first, nominal, WIDER)
+    assert not says_more(told(["delay"], 80.0), first, nominal, WIDER)
     assert not says_more(told(["delay", "torque_bias"], 40.0), first, nominal, WIDER)
     assert not says_more(told(["torque_bias", "viscous_friction"], 60.0), first, nominal, WIDER)
 

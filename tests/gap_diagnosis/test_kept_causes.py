@@ -18,20 +18,20 @@ from gap_diagnosis.outcome.cause import LEAST_PRESENT, MOST_SHARE
 from gap_diagnosis.outcome.gap_size import Estimate
 from gap_diagnosis.outcome.verdict_words import explanation
 from gap_diagnosis.verdict import kept_causes as kept_causes_module
-from gap_diagnosis.verdict.kept_causes import (
-    LEAST_BEARING,
-    SURE,
-    _bases,
-    _bearing,
-    _bears,
-    _guesses,
-    _lacked,
-    kept,
-)
+from gap_diagnosis.verdict.kept_causes import kept
 from gap_diagnosis.verdict.named_twice import twice
 from gap_diagnosis.verdict.not_named import _bent, _changing, _kin, beyond_named
 from gap_diagnosis.verdict.notes import unusual
 from gap_diagnosis.verdict.spoiling import spoils, unspoiled
+from gap_diagnosis.verdict.staying import (
+    LEAST_BEARING,
+    SURE,
+    bases_of,
+    bears,
+    guesses,
+    lacked_frictions,
+    with_borne,
+)
 from gap_diagnosis.verdict.taken_out import _begun_anew, one_by_one
 from gap_diagnosis.verdict.tested_causes import causes_with_tests
 from gap_diagnosis.which import stepwise
@@ -138,8 +138,8 @@ def test_a_third_cause_must_be_sure(tested):
     sure = [replace(t, gain=g, in_band=0.99) for t, g in zip(tested, gains, strict=True)]
     guess = replace(sure[2], in_band=0.5, over_noise_closed=0.5, share=replace_share(sure[2].share))
     assert guess.present < SURE
-    assert _guesses([*sure[:2], guess]) == [guess]
-    assert _guesses([guess, replace(sure[0], gain=gains[0])]) == []
+    assert guesses([*sure[:2], guess]) == [guess]
+    assert guesses([guess, replace(sure[0], gain=gains[0])]) == []
 
 
 def replace_share(share):
@@ -258,16 +258,16 @@ def test_of_near_equivalents_the_one_that_closes_little_beside_the_other_names_i
     assert twice(fitter, best, [delay, replace(lag, without=found.without)]) == []
 
 
-@pytest.mark.parametrize(("present", "bears"), [(0.99, True), (0.7, False)])
+@pytest.mark.parametrize(("present", "expected"), [(0.99, True), (0.7, False)])
 def test_what_is_unsure_stays_if_without_it_a_cause_fails_that_is_sure_beside_it(
-    tested, present, bears
+    tested, present, expected
 ):
     sure = max(tested, key=lambda t: t.present)
     failed = replace(sure, certain=False)
     assert sure.passed and sure.present > 0.8 and not failed.passed
     beside = sure if present > 0.8 else replace(sure, gain=replace(sure.gain, share=0.6))
-    assert _bears([beside], [failed]) == bears
-    assert not _bears([beside], [sure])
+    assert bears([beside], [failed]) == expected
+    assert not bears([beside], [sure])
 
 
 @pytest.mark.parametrize(
@@ -362,7 +362,7 @@ def test_what_repeats_but_is_not_sure_stays_where_what_passes_fails_without_it(
         return found
 
     judged_by(monkeypatch, told)
-    monkeypatch.setattr(kept_causes_module, "_guesses", lambda *_: [])
+    monkeypatch.setattr(kept_causes_module, "guesses", lambda *_: [])
     monkeypatch.setattr(kept_causes_module, "_TOGETHER", 0.0)
     steps = [fits[0], fits[2], fits[3]]
     found, _ = kept(fitter, Found(steps), SCATTER, lambda _: None, fits[-1].effects)
@@ -461,7 +461,7 @@ def test_what_fails_again_and_again_ends(searched, monkeypatch):
 
     monkeypatch.setattr(kept_causes_module, "causes_with_tests", tests_of)
     monkeypatch.setattr(kept_causes_module, "twice", lambda fitter, best, tested: list(tested))
-    monkeypatch.setattr(kept_causes_module, "_bears", lambda *_: True)
+    monkeypatch.setattr(kept_causes_module, "bears", lambda *_: True)
     monkeypatch.setattr(kept_causes_module, "LEAST_BEARING", 0.0)
     found, tested = kept(fitter, Found(fits), SCATTER, lambda _: None, fits[-1].effects)
     assert len(tested) == len(found.best.effects) <= 2
@@ -481,7 +481,7 @@ def test_a_cause_whose_shape_blurs_its_size_stays_where_sure_ones_fail_without_i
         ]
 
     monkeypatch.setattr(kept_causes_module, "causes_with_tests", tests_of)
-    monkeypatch.setattr(kept_causes_module, "_bears", lambda *_: True)
+    monkeypatch.setattr(kept_causes_module, "bears", lambda *_: True)
     monkeypatch.setattr(kept_causes_module, "in_its_place", lambda *_: None)
     found, _ = kept(fitter, Found(fits[:3]), SCATTER, lambda _: None, fits[2].effects)
     assert (blurred in found.best.effects) is stays
@@ -493,12 +493,12 @@ def test_friction_that_a_datasheet_lacks_stays_unless_something_is_against_it(se
     first = max(tested, key=lambda t: t.present)
     seldom = replace(first, effect="viscous_friction", gain=Gain(5.0, 4.0, 0.8, 0.1))
     assert not seldom.passed and seldom.gains and seldom.present >= LEAST_BEARING
-    assert _lacked(BOTH, [seldom]) == {"viscous_friction"}
-    assert _lacked((), [seldom]) == set()
+    assert lacked_frictions(BOTH, [seldom]) == {"viscous_friction"}
+    assert lacked_frictions((), [seldom]) == set()
     grown = seldom.share.model_copy(update={"value": -0.1, "low": -0.2, "high": -0.05})
     drifting = replace(seldom, share=grown)
-    assert not drifting.gains and _lacked(BOTH, [drifting]) == set()
-    assert _lacked(BOTH, [replace(drifting, gain=SURELY)]) == {"viscous_friction"}
+    assert not drifting.gains and lacked_frictions(BOTH, [drifting]) == set()
+    assert lacked_frictions(BOTH, [replace(drifting, gain=SURELY)]) == {"viscous_friction"}
     for other in (
         {"effect": "torque_bias"},
         {"certain": False},
@@ -507,7 +507,7 @@ def test_friction_that_a_datasheet_lacks_stays_unless_something_is_against_it(se
         {"gain": Gain(5.0, 4.0, 0.8, 0.2)},
         {"invariance_p": 1e-4, "own_sizes": 0.1},
     ):
-        assert _lacked(BOTH, [replace(seldom, **other)]) == set()
+        assert lacked_frictions(BOTH, [replace(seldom, **other)]) == set()
 
 
 def test_what_a_present_cause_modifies_is_as_present_and_lacked_friction_is_no_guess(searched):
@@ -516,12 +516,12 @@ def test_what_a_present_cause_modifies_is_as_present_and_lacked_friction_is_no_g
     there = replace(first, effect="asymmetric_friction", gain=SURELY, certain=True)
     doubtful = replace(first, effect="coulomb_friction", gain=Gain(0.5, 0.1, 0.6, 0.3))
     assert doubtful.present < there.present
-    base, other = _bearing([doubtful, there])
+    base, other = with_borne([doubtful, there])
     assert base.present == there.present == other.present
     unsure = [replace(there, effect=e, gain=Gain(m, m, 1.0, 0.04))
               for e, m in (("delay", 9.0), ("viscous_friction", 8.0), ("torque_bias", 2.0),
                            ("cogging", 1.0))]  # fmt: skip
-    assert [t.effect for t in _guesses(unsure, BOTH)] == ["cogging"]
+    assert [t.effect for t in guesses(unsure, BOTH)] == ["cogging"]
 
 
 def test_what_passing_causes_modify_stays_where_the_datasheet_lacks_it(searched, tested):
@@ -534,10 +534,10 @@ def test_what_passing_causes_modify_stays_where_the_datasheet_lacks_it(searched,
     falls = replace(falls, in_band=0.99, bounded=None, left=0.0, over_noise=0.0)
     assert falls.passed
     names = ("coulomb_friction", "stribeck_friction_motor")
-    assert _bases(without, [base, falls], names) == {"coulomb_friction"}
-    assert _bases(without, [replace(base, certain=False), falls], names) == set()
-    assert _bases(without, [base, replace(falls, certain=False)], names) == set()
-    assert _bases(fitter, [base, falls], names) == set()  # whose datasheet has friction
+    assert bases_of(without, [base, falls], names) == {"coulomb_friction"}
+    assert bases_of(without, [replace(base, certain=False), falls], names) == set()
+    assert bases_of(without, [base, replace(falls, certain=False)], names) == set()
+    assert bases_of(fitter, [base, falls], names) == set()  # whose datasheet has friction
 
 
 def test_a_size_beyond_what_machines_have_is_doubted_and_this_is_said(tested):
@@ -554,28 +554,49 @@ def test_what_others_needed_goes_when_they_no_longer_do(searched, tested, monkey
     """It stayed since a sure cause failed without it, and is nowhere to be seen after that went."""
     fitter, fits = searched
     sure = max(tested, key=lambda t: t.present)
-    needless, bears, last = "stribeck_friction_motor", "delay", "torque_bias"
+    needless, bearing, last = "stribeck_friction_motor", "delay", "torque_bias"
 
     def told(_fitter, fit, *_):
         found = []
         for effect in fit.effects:
             one = replace(sure, effect=effect, without=fitter.without(fit, effect))
             if effect == needless:
-                seen = bears in fit.effects
+                seen = bearing in fit.effects
                 gain = Gain(5.0, 4.0, 0.7, 0.01) if seen else Gain(-5.0, 4.0, 0.1, 0.9)
                 one = replace(one, gain=gain)
-            if effect == bears:
+            if effect == bearing:
                 one = replace(one, certain=False, gain=Gain(9.0, 4.0, 0.7, 0.01))
             found.append(one)
         return found
 
     judged_by(monkeypatch, told)
     monkeypatch.setattr(
-        kept_causes_module, "_bears", lambda tested, *_: any(t.effect == bears for t in tested)
+        kept_causes_module, "bears", lambda tested, *_: any(t.effect == bearing for t in tested)
         and tested[0].effect == needless and len(tested) == 3,
     )  # fmt: skip
     found, left = kept(fitter, Found(fits), SCATTER, lambda _: None, fits[-1].effects)
     assert found.best.effects == (last,) == tuple(t.effect for t in left)
+
+
+@pytest.mark.parametrize("tried", [True, False])
+def test_what_was_passed_over_for_a_cause_that_goes_is_added_if_all_pass_beside_it(
+    searched, monkeypatch, tried
+):
+    """A constant torque is there; a needless cause did better, and nothing was put in its place.
+
+    Without that torque the delay, which is there as well, fails too, and passes once it is added.
+    """
+    fitter, fits = searched
+    proposals = fitter.screening(fits[0], "torque_bias").proposals()
+    over = fitter.add(fits[0], "torque_bias", proposals)
+    monkeypatch.setattr(kept_causes_module, "in_its_place", lambda *_: None)
+    rivals = {1: [fits[1], over] if tried else [fits[1]]}
+    found = Found(fits[:3], rivals=rivals)
+    left, tested = kept(fitter, found, SCATTER, lambda _: None, fits[-1].effects)
+    there = {"delay", "torque_bias"} if tried else set()
+    assert {t.effect for t in tested} == set(left.best.effects) == there
+    assert set(left.doubted) == set(fits[2].effects) - there
+    assert ("torque_bias" in left.alternatives) == tried
 
 
 def test_what_would_leave_less_beside_the_named_causes_is_told_whole_or_not_at_all(searched):
