@@ -3,11 +3,11 @@
 Recorded runs and a nominal (datasheet) go in, an `outcome.diagnosis.Diagnosis` and its report come
 out. `any_record` reads what a folder holds; `investigation` leads from runs to a verdict: fits of
 one explanation (`starts`, `fits`), the search over explanations (`searching`, by `which`), what of
-it is kept, and how sure (`verdict`), and the gap on data that no fit has seen (`how_far`). Where
-fits end at a limit, `further_looks` asks for another one. An experiment of steady periods comes
-through `steady_periods`: `gates` before it (are the periods fit for a diagnosis?), residual maps
-(`where`), BLA and `next_experiment` after it. All simulate through `model`; `report` writes what
-was found. `foresight` says beforehand what could be found.
+it is kept, and how sure (`verdict`), both `by_turns`, and the gap on data that no fit has seen
+(`how_far`). Where fits end at a limit, `further_looks` asks for another one. An experiment of
+steady periods comes through `steady_periods`: `gates` before it (are the periods fit for a
+diagnosis?), residual maps (`where`), BLA and `next_experiment` after it. All simulate through
+`model`; `report` writes what was found. `foresight` says beforehand what could be found.
 
     >>> from gap_diagnosis import diagnose, read_nominal
     >>> diagnosis = diagnose("rig", read_nominal("paper"))

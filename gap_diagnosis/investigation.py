@@ -12,6 +12,7 @@ from fjr_kit.telling import Progress
 from fjr_records.periodic import RecordedExperiment, RecordedRealization
 from fjr_records.records import Record, RecordSet
 
+from .by_turns import judged
 from .fits.cell_fits import DRIFT, CellFitter
 from .fits.comparison import NOTHING_LEFT, CellFit
 from .fits.estimates import moved_by_scatter, relative_scatter
@@ -31,18 +32,16 @@ from .model.steady_runs import SteadyRuns
 from .outcome.cause import LEAST_PRESENT
 from .outcome.diagnosis import Bags, Diagnosis
 from .outcome.verdict_words import BACKWARDS, LOST, ROUNDING
-from .searching import at_its_time, misses, stepwise
+from .searching import at_its_time, misses
 from .starts.catalogue import catalogue
 from .starts.search_space import TOLERANCE
 from .verdict.between_regressions import reaching_to_torques
 from .verdict.coarse_encoder import with_coarse_encoder
-from .verdict.contenders import contenders, tied_fits
+from .verdict.contenders import contenders
 from .verdict.judgement import driven_backwards, judge, reproduced
-from .verdict.kept_causes import kept
 from .verdict.noisy_torque import beside_the_noise, unfelt_noise
 from .verdict.notes import of_fit, of_records, yielding
 from .verdict.tested_causes import Tested, octaves_left
-from .which.exchange import with_the_better_one
 from .which.found import Found
 from .which.late_torque import is_late
 from .which.narrow_band import narrow
@@ -190,14 +189,7 @@ def investigate_runs(
     progress("scatter from run to run")
     bags, scatter, said = _run_scatter(fitter, found.best)
     heard += said
-    found, tested = kept(fitter, found, scatter, progress, names, until)
-    progress("what may stand in for a cause")
-    tied = tied_fits(fitter, found, tested, names)
-    if (anew := with_the_better_one(found, tied, fitter)) and time.monotonic() < until:
-        progress(f"search with {anew.best.effects[-1]}")
-        anew = stepwise(fitter, names, progress, until).go_on(anew)
-        found, tested = kept(fitter, anew, scatter, progress, names, until)
-        tied = tied_fits(fitter, found, tested, names)
+    found, tested, tied = judged(fitter, found, scatter, names, progress, until)
     backwards = driven_backwards(evidence)
     lost = reproduced(fitter, found.best) < LEAST_PRESENT
     if backwards or ((tested or not names) and lost):

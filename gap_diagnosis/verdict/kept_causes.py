@@ -145,7 +145,7 @@ class _Keeping:
         steps = list(found.steps)
         if steps[-1].effects:
             steps[-1] = fitter.settled(steps[-1])
-        self._kept = _Kept(steps, [], list(found.notes))
+        self._kept = _Kept(steps, [], list(found.notes), doubted=found.doubted)
         self._replaced: set[str] = set()
         self._bearing: set[str] = set()  # stay, since others fail without them...
         self._released: set[str] = set()  # ...until these have gone...

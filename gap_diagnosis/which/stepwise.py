@@ -118,13 +118,13 @@ class Stepwise:
                 return False
             if not (new := look(fits, found)):
                 continue
-            fits = new
-            if (chosen := self._repeating(fits, found)) is not None:
+            if (chosen := self._repeating(new, found)) is not None:
                 found.alternatives[chosen.effects[-1]] = self.extension.tied(
-                    chosen, fits, found.best
+                    chosen, new, found.best
                 )
                 found.steps.append(chosen)
                 return True
+            fits += new
         return False
 
     def _singles(self, _: Sequence[CellFit], found: Found) -> list[CellFit]:

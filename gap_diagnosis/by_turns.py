@@ -1,0 +1,85 @@
+"""Search and judgement by turns: a search goes on beside what is kept, if it never had just that."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from fjr_kit.telling import Progress
+
+from .fits.cell_fits import CellFitter
+from .fits.comparison import NOTHING_LEFT, CellFit
+from .fits.gains import gain
+from .searching import stepwise
+from .verdict.contenders import tied_fits
+from .verdict.kept_causes import kept
+from .verdict.tested_causes import Tested
+from .which.exchange import with_the_better_one
+from .which.found import Found
+
+
+def judged(
+    fitter: CellFitter,
+    found: Found,
+    scatter: Mapping[str, float],
+    names: Sequence[str],
+    progress: Progress,
+    until: float,
+) -> tuple[Found, list[Tested], dict[str, list[CellFit]]]:
+    """Return what is kept of what was found, its tests, and what does as well in place of each.
+
+    Args:
+        fitter: of the search.
+        found: what the search found.
+        scatter: of parameters from run to run, see `moved_by_scatter`.
+        names: identifiers of what may be named.
+        progress: told what is done.
+        until: when nothing new is begun (s, `time.monotonic`).
+    """
+    left, tested = kept(fitter, found, scatter, progress, names, until)
+    if time.monotonic() < until and _never_searched_beside(fitter, found, left):
+        left, tested = _goes_on(fitter, left, tested, scatter, names, progress, until)
+    progress("what may stand in for a cause")
+    tied = tied_fits(fitter, left, tested, names)
+    if (anew := with_the_better_one(left, tied, fitter)) and time.monotonic() < until:
+        progress(f"search with {anew.best.effects[-1]}")
+        anew = stepwise(fitter, names, progress, until).go_on(anew)
+        left, tested = kept(fitter, anew, scatter, progress, names, until)
+        tied = tied_fits(fitter, left, tested, names)
+    return left, tested, tied
+
+
+def _never_searched_beside(fitter: CellFitter, found: Found, left: Found) -> bool:
+    """Tell whether a cause that has gone stood between what is kept and what else is there.
+
+    What was added after that cause did well beside it, which says little of what does beside the
+    others alone.
+    """
+    causes = {*left.best.effects}
+    if not causes or fitter.left_in_a_band(left.best) < NOTHING_LEFT:
+        return False
+    return all(causes != {*fit.effects} for fit in found.steps)
+
+
+def _goes_on(
+    fitter: CellFitter,
+    left: Found,
+    tested: list[Tested],
+    scatter: Mapping[str, float],
+    names: Sequence[str],
+    progress: Progress,
+    until: float,
+) -> tuple[Found, list[Tested]]:
+    """Search beside what is kept, without what has gone; return what is kept then, if that gains.
+
+    Arguments are those of `judged`, with what is kept and its tests.
+    """
+    others = [name for name in names if name not in left.doubted]
+    progress("search beside what is kept")
+    begun = replace(left, steps=[*left.steps], rivals={**left.rivals})
+    more = stepwise(fitter, others, progress, until).go_on(begun)
+    if {*more.best.effects} == {*left.best.effects}:
+        return left, tested
+    more, tests = kept(fitter, more, scatter, progress, others, until)
+    return (more, tests) if gain(fitter, more.best, left.best).present else (left, tested)
