@@ -1,4 +1,4 @@
-"""Search and judgement by turns: a search goes on beside what is kept, if it never had just that."""
+"""Search and judgement by turns: the search goes on beside what is kept, if it never had that."""
 
 from __future__ import annotations
 
