@@ -140,6 +140,7 @@ DRIVE: tuple[Effect, ...] = (
         (size("width_nm", "N m", "Half width of the dead band"),),
         ({"width_nm": (0.003, 0.03)},),
         of_command=True,
+        takes_from="coulomb_friction",
     ),
     Effect(
         "torque_constant_ripple",

@@ -141,6 +141,8 @@ class Effect:
         from_part: where its fit begins if one of what it holds was fitted: its parameters by full
             name, from the parameters of that fit's effects and of its bare plant; None: as without.
         rarer_than: the commoner effect that is named where the data cannot tell it from this one.
+        takes_from: the effect that does the part of both alone, so that no small step leads from a
+            fit of that one to both, which begins with half its size in each; empty if steps do.
         modifies: the effect that brings in what this one changes, so that a rig which lacks that
             has nothing to change; empty if it stands by itself.
         on_request: whether a diagnosis looks for it only if it is asked to, or if a law that it
@@ -173,6 +175,7 @@ class Effect:
     contains: tuple[str, ...] = ()
     from_part: FromPart | None = None
     rarer_than: str = ""
+    takes_from: str = ""
     modifies: str = ""
     on_request: bool = False
     of_bare_plant: bool = False

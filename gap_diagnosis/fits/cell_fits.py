@@ -245,6 +245,26 @@ class CellFitter(ReweightedFits):
                 best = fit
         return None if best is None else replace(best, acts=self.acted(best, *before, effect))
 
+    def halved(self, parent: CellFit, effect: str) -> CellFit | None:
+        """Fit an effect beside the one of the parent that does the part of both, from half of each.
+
+        None if the parent lacks that one; see `Effect.takes_from`.
+        """
+        whole = fx.EFFECTS[effect].takes_from
+        sizes = [n for n in parent.model.effects if n.split(".")[0] == whole] if whole else []
+        half = {name: 0.5 * parent.model.effects[name] for name in sizes}
+        if not any(half.values()):
+            return None
+        seed = {fx.EFFECTS[effect].size_names[0]: sum(half.values())}
+        space = self._space(parent, seed)
+        begun = Model(parent.model.plant, {**parent.model.effects, **half, **seed})
+        point = np.clip(space.point(begun), *space.bounds())
+        variance = self.weights.variance(
+            self.evidence.errors([space.model(point)], self.fit_parts)[0]
+        )
+        fit = self.reweighted((*parent.effects, effect), space, point, variance, _ADDED_ROUNDS)
+        return replace(fit, acts=self.acted(fit, effect))
+
     def promises(self, parent: CellFit, proposals: Sequence[Proposal]) -> bool:
         """Tell whether a start beside a fit gains enough to be pursued."""
         return any(cost <= self.begun(parent) - _LEAST_PROMISE for cost, *_ in proposals[:1])

@@ -90,6 +90,7 @@ class Extension:
             fit = self._fitter.add(parent, effect, begun, _STARTS[later])
             if fit is not None:
                 fits.append(fit)
+        fits = self._halved(parent, effects, fits)
         if (sticking := self._sticking(parent, effects)) is not None:
             fits.append(sticking)
         if not parent.effects and not self._fitter.evidence.slow and set(LACKED) & set(effects):
@@ -97,6 +98,18 @@ class Extension:
             fits += self._fitter.together(parent, self.effects)
         fits = [f for f in fits if f.effects[-1] not in twice or self._closes_the_rest(f, parent)]
         return Polish(self._fitter, self._progress).polished(self.ranked(fits, parent), parent)
+
+    def _halved(
+        self, parent: CellFit, effects: Sequence[str], fits: Sequence[CellFit]
+    ) -> list[CellFit]:
+        """Return fits, of effects that share with a cause of the parent those from half of each."""
+        chosen = {fit.effects: fit for fit in fits}
+        for effect in effects:
+            fit = self._fitter.halved(parent, effect)
+            known = None if fit is None else chosen.get(fit.effects)
+            if fit and (known is None or self._fitter.gains(fit, known).sum() > 0.0):
+                chosen[fit.effects] = fit
+        return list(chosen.values())
 
     def _sticking(self, parent: CellFit, effects: Sequence[str]) -> CellFit | None:
         """Return the parent with friction and its bristles, where there is no friction yet."""

@@ -48,7 +48,8 @@ class Timing:
     def other_if_better(self, best: CellFit, sought: Sequence[str]) -> Timing | None:
         """Return the other way, if what was found speaks for it.
 
-        A signal that was found to come half a sample late is one that is held; one that comes late
+        A signal that was found to come half a sample late is one that is held, unless unseen parts
+        surely say otherwise; one that comes late
         by another time may do clearly better as a held torque behind a delay or a lag: its means
         over samples lag too. A torque that was held while causes were missing may do clearly better
         as a signal beside them, and so may a signal as a held torque, where no delay was sought.
@@ -69,7 +70,7 @@ class Timing:
         held = other.fitter.without(best, late)
         if _half(best.model, late, self.fitter.evidence.records.sample_rate_hz):
             worth = gain(self.fitter, best, self.fitter.without(best, late)).mean
-            if stands_for(self.fitter, held, best, worth):
+            if stands_for(self.fitter, held, best, worth, near=True):
                 return other
         tried = [_with(other.fitter, held, effect) for effect in _LATE]
         return other if any(gain(self.fitter, fit, best).present for fit in tried) else None
