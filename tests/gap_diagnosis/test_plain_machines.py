@@ -65,7 +65,7 @@ class Speeds:
         return float(self.values[number])
 
 
-def told(folder: Path, runs, rate_hz: float, jm: float, unit: str = "1") -> Diagnosis:
+def told(folder: Path, runs, rate_hz: float, jm: float, unit: str = "1", effects=None) -> Diagnosis:
     files = []
     for number, (torque, position) in enumerate(runs):
         files.append(folder / f"run_{number}.csv")
@@ -75,7 +75,7 @@ def told(folder: Path, runs, rate_hz: float, jm: float, unit: str = "1") -> Diag
     maps = ["time=t", f"position=q:{unit}", *([] if free else ["torque=tau:1"])]
     options = ImportOptions(parse_map(maps, swings_free=free), swings_free=free)
     import_files(files, folder / "bags", options)
-    return diagnose(folder / "bags", {"jm": jm, "k0": math.inf})
+    return diagnose(folder / "bags", {"jm": jm, "k0": math.inf}, effects=effects)
 
 
 def assert_sizes(found: Diagnosis, truth: dict[str, float], within: float) -> None:
@@ -150,3 +150,44 @@ def test_friction_that_falls_from_breakaway_is_found_in_stairs_of_speed(tmp_path
         "stribeck_friction_motor.velocity_rad_s": 1.0,
     }
     assert_sizes(told(tmp_path, runs, rate, 0.011), truth, 0.2)
+
+
+def voltages(volts: np.ndarray, dead: float, seed: int, step: float, rate: float, sizes):
+    """Return a command and the angle of a small motor whose driver ignores small ones."""
+    inertia, dry, more, fallen, wet = sizes
+    rng, acts = np.random.default_rng(seed), np.sign(volts) * np.maximum(np.abs(volts) - dead, 0.0)
+    share = 1.0 + 0.02 * rng.standard_normal()
+    lost = lambda v: (share * (dry + more * math.exp(-((v / fallen) ** 2))), share * wet * v)  # noqa: E731
+    angle, _ = moved(Given(acts), rate, 40, inertia, lost)
+    return volts, np.round(angle / step) * step
+
+
+SMALL_MOTOR = ("viscous_friction", "coulomb_friction", "presliding_friction", "dead_band", "delay",
+               "actuator_lag")  # fmt: skip
+
+
+def test_a_dead_band_that_coulomb_friction_stands_for_is_found_beside_it(tmp_path):
+    """The one alone does the part of both, and from there no small step gains anything."""
+    rate, stamps = 200.0, np.arange(8000) / 200.0
+    command = 31.2 / np.pi * np.arcsin(np.sin(2.0 * np.pi * stamps / 3.9))
+    sizes = 0.0413, 0.58, 0.3, 4.0, 0.107
+    runs = [voltages(command, 0.99, 5, 2.0 * np.pi / 2048, rate, sizes)]
+    found = told(tmp_path, runs, rate, 0.0372, effects=SMALL_MOTOR)
+    truth = {"dead_band.width_nm": 0.99, "viscous_friction.motor_nm_s_rad": 0.107}
+    assert set(found.effects) == {*SMALL_MOTOR[:2], "dead_band"}
+    for name, size in truth.items():
+        assert found.parameters[name].value == pytest.approx(size, rel=0.05), name
+    assert found.parameters["coulomb_friction.motor_nm"].value == pytest.approx(0.58, rel=0.2)
+
+
+def test_a_voltage_that_is_held_is_no_signal_half_a_sample_late(tmp_path):
+    rate, stamps, rng = 100.0, np.arange(4000) / 100.0, np.random.default_rng(1)
+    steps = np.repeat(9.3 * rng.uniform(-1.0, 1.0, 48), 85)[: stamps.size]
+    sweep = 5.0 * np.sin(2.0 * np.pi * (0.05 * stamps + 4.6 * stamps**2 / 80.0))
+    sizes = 0.0612, 1.145, 0.545, 0.9, 0.297
+    runs = [voltages(volts, 0.0, number, 2.0 * np.pi / 4096, rate, sizes)
+            for number, volts in enumerate((steps, sweep), 1)]  # fmt: skip
+    found = told(tmp_path, runs, rate, 0.0673, effects=SMALL_MOTOR)
+    assert not {"delay", "actuator_lag", "dead_band"} & {*found.effects}
+    assert set(SMALL_MOTOR[:2]) <= set(found.effects)
+    assert found.parameters["jm"].value == pytest.approx(0.0612, rel=0.03)
