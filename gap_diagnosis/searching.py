@@ -74,16 +74,19 @@ def misses(fitter: CellFitter, fit: CellFit, parts: Sequence[int] | None = None)
 def _again(
     timing: Timing, before: Found, names: Sequence[str], progress: Progress, until: float
 ) -> Found:
-    """Search anew; what was found before counts where there is no time to find as much again."""
+    """Search anew; what was found before counts where it surely explains more.
+
+    Or explains more at all, where there is no time to find as much again.
+    """
     fitter, anew = timing.fitter, None
     if time.monotonic() < until:
         anew = _searched(timing, names, progress, until)
-        if anew.complete:
-            return anew
     steps = [timing.refit, *(fitter.taken_over(fit) for fit in before.steps[1:])]
     carried = replace(before, steps=steps, rivals={}, complete=False)
-    better = anew is not None and fitter.gains(anew.best, carried.best).sum() > 0.0
-    return anew if anew is not None and better else carried
+    if anew is None:
+        return carried
+    more = gain(fitter, carried.best, anew.best)
+    return carried if more.present or (not anew.complete and more.mean > 0.0) else anew
 
 
 def _searched(timing: Timing, names: Sequence[str], progress: Progress, until: float) -> Found:

@@ -250,9 +250,10 @@ class CellFitter(ReweightedFits):
 
         None if the parent lacks that one; see `Effect.takes_from`.
         """
-        whole = fx.EFFECTS[effect].takes_from
-        sizes = [n for n in parent.model.effects if n.split(".")[0] == whole] if whole else []
-        half = {name: 0.5 * parent.model.effects[name] for name in sizes}
+        takes_from = {e: fx.EFFECTS[e].takes_from for e in (*parent.effects, effect)}
+        whole = [e for e in parent.effects if takes_from[e] == effect or takes_from[effect] == e]
+        sizes = [name for e in whole for name in fx.EFFECTS[e].size_names]
+        half = {name: 0.5 * parent.model.effects.get(name, 0.0) for name in sizes}
         if not any(half.values()):
             return None
         seed = {fx.EFFECTS[effect].size_names[0]: sum(half.values())}

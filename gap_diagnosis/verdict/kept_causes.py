@@ -177,7 +177,8 @@ class _Keeping:
         if (guessed or nearly) and bears(kept.tested, tests, least):
             self._bearing.add(cause.effect)
             return True
-        if cause.gains_more_often and bears(kept.tested, tests, LEAST_PRESENT):
+        may_be = cause.gains_more_often and cause.present > 0.0
+        if may_be and bears(kept.tested, tests, LEAST_PRESENT):
             self._missed.append((cause.effect, kept))
         self._passed_over += passed_over(self._fitter, self._found, kept.best, cause.effect)
         left = kept.without(cause, passed=guessed and cause.passed)

@@ -301,11 +301,16 @@ def test_within_a_search_what_nearly_passes_stays_if_without_it_sure_causes_fail
 
 
 @pytest.mark.parametrize(
-    ("in_time", "together", "right"),
-    [(True, 0.0, True), (False, 0.0, False), (False, 0.5, True)],
+    ("in_time", "together", "p", "right"),
+    [
+        (True, 0.0, 0.15, True),
+        (False, 0.0, 0.15, False),
+        (False, 0.5, 0.15, True),
+        (False, 0.5, 1.0, False),  # none is brought back that would be named with 0 %
+    ],
 )
 def test_of_causes_that_fail_that_goes_first_which_no_other_misses(
-    searched, tested, monkeypatch, in_time, together, right
+    searched, tested, monkeypatch, in_time, together, p, right
 ):
     """What gains least may be what others cannot do without, and pass once a needless one went.
 
@@ -322,7 +327,7 @@ def test_of_causes_that_fail_that_goes_first_which_no_other_misses(
             if effect == needless:
                 one = replace(one, gain=Gain(5.0, 4.0, 0.2, 0.6))
             if effect == needed and needless in fit.effects:
-                one = replace(one, gain=Gain(2.0, 1.5, 0.7, 0.2))
+                one = replace(one, gain=Gain(2.0, 1.5, 0.7, p))
             if effect == other and needed not in fit.effects:
                 one = replace(one, certain=False, gain=Gain(0.1, 0.0, 0.2, 0.9))
             found.append(one)
