@@ -365,6 +365,8 @@ def screw(rng: np.random.Generator) -> Machine:
         )  # fmt: skip
         noise = 0.02 * np.sqrt(np.mean(found[1] ** 2)) * rng.standard_normal(target.size)
         runs.append(np.array([np.arange(target.size) / rate, found[0], found[1] + noise]))
+    if cycles == 1.0 and "ripple" in truth:  # once in a turn: what an unbalanced weight does
+        truth["gravity"] = truth.pop("ripple")
     return Machine(truth, rate, runs)
 
 

@@ -161,18 +161,13 @@ def hold(x, command, sample_period, p, e, prompt=0.0):
         sample_period: Ts (s).
         p: bare parameters, `plant.coefficients`.
         e: effects, `effects.coefficients`, or None.
-        prompt: torque (N m) beside the command that no delay holds up, such as an observer's.
+        prompt: torque (N m) beside the command, such as an observer's, that no dead band, limit,
+            gain or delay of the drive changes.
     """
     if e is None:
         u = command + prompt
         x[0], x[1], x[2], x[3] = advance(x[0], x[1], x[2], x[3], u, sample_period, p)
         return
-    more = 0.0
-    if e[fx.DELAY_TIME_S] == 0.0:
-        command += prompt
-    elif prompt != 0.0:
-        more = asked(command + prompt, e) - asked(command, e)
-        more *= 1.0 + e[fx.TORQUE_GAIN_RELATIVE_ERROR]
     slewing = 0.0
     if e[fx.TORQUE_SLEW_LIMIT_LIMIT_NM_S] != math.inf:
         most = e[fx.TORQUE_SLEW_LIMIT_LIMIT_NM_S] * sample_period
@@ -180,22 +175,22 @@ def hold(x, command, sample_period, p, e, prompt=0.0):
         if e[fx.DELAY_TIME_S] != 0.0:  # what is remembered must lie evenly in time
             slewing = 1.0
     if not slewing > _AT_ONCE:
-        _hold_with_effects(x, command, more, sample_period, p, e)
+        _hold_with_effects(x, command, prompt, sample_period, p, e)
         return
     parts = math.ceil(_SLEW_PARTS * slewing)
     for _ in range(parts):
-        _hold_with_effects(x, command, more, slewing * sample_period / parts, p, e)
+        _hold_with_effects(x, command, prompt, slewing * sample_period / parts, p, e)
     if slewing < 1.0:
-        _hold_with_effects(x, command, more, (1.0 - slewing) * sample_period, p, e)
+        _hold_with_effects(x, command, prompt, (1.0 - slewing) * sample_period, p, e)
 
 
 @jit
-def _hold_with_effects(x, command, more, sample_period, p, e):
+def _hold_with_effects(x, command, prompt, sample_period, p, e):
     torque = driven(x, command, sample_period, e)
     friction = max(1.0 + e[fx.NONSTATIONARY_FRICTION_PER_S] * x[_TIME], 0.0)
     x[_TIME] += sample_period
     if e[fx.DELAY_TIME_S] == 0.0:
-        advance_with_effects(x, torque, sample_period, p, e, friction)
+        advance_with_effects(x, torque + prompt, sample_period, p, e, friction)
         return
     head = (int(x[_HEAD]) + 1) % _RING_SIZE
     x[_HEAD] = head
@@ -209,5 +204,5 @@ def _hold_with_effects(x, command, more, sample_period, p, e):
     now = x[_RING + (head - whole) % _RING_SIZE]
     late = max(samples - whole, 0.0) * sample_period
     if late > 0.0:
-        advance_with_effects(x, before + more, late, p, e, friction)
-    advance_with_effects(x, now + more, sample_period - late, p, e, friction)
+        advance_with_effects(x, before + prompt, late, p, e, friction)
+    advance_with_effects(x, now + prompt, sample_period - late, p, e, friction)
