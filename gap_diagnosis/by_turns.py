@@ -77,7 +77,12 @@ def _goes_on(
     """
     others = [name for name in names if name not in left.doubted]
     progress("search beside what is kept")
-    begun = replace(left, steps=[*left.steps], rivals={**left.rivals})
+    begun = replace(
+        left,
+        steps=[*left.steps],
+        rivals={**left.rivals},
+        alternatives={**left.alternatives},
+    )
     more = stepwise(fitter, others, progress, until).go_on(begun)
     if {*more.best.effects} == {*left.best.effects}:
         return left, tested

@@ -81,12 +81,13 @@ def _again(
     fitter, anew = timing.fitter, None
     if time.monotonic() < until:
         anew = _searched(timing, names, progress, until)
+    ended = anew is not None and anew.complete
     steps = [timing.refit, *(fitter.taken_over(fit) for fit in before.steps[1:])]
-    carried = replace(before, steps=steps, rivals={}, complete=False)
+    carried = replace(before, steps=steps, rivals={}, complete=ended)
     if anew is None:
         return carried
     more = gain(fitter, carried.best, anew.best)
-    return carried if more.present or (not anew.complete and more.mean > 0.0) else anew
+    return carried if more.present or (not ended and more.mean > 0.0) else anew
 
 
 def _searched(timing: Timing, names: Sequence[str], progress: Progress, until: float) -> Found:

@@ -102,7 +102,10 @@ class Extension:
     def _halved(
         self, parent: CellFit, effects: Sequence[str], fits: Sequence[CellFit]
     ) -> list[CellFit]:
-        """Return fits, of effects that share with a cause of the parent those from half of each."""
+        """Return fits with those of effects that a cause of the parent stands for in part.
+
+        Of two fits of one explanation the better one.
+        """
         chosen = {fit.effects: fit for fit in fits}
         for effect in effects:
             fit = self._fitter.halved(parent, effect)

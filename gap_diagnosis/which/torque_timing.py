@@ -49,10 +49,10 @@ class Timing:
         """Return the other way, if what was found speaks for it.
 
         A signal that was found to come half a sample late is one that is held, unless unseen parts
-        surely say otherwise; one that comes late
-        by another time may do clearly better as a held torque behind a delay or a lag: its means
-        over samples lag too. A torque that was held while causes were missing may do clearly better
-        as a signal beside them, and so may a signal as a held torque, where no delay was sought.
+        surely say otherwise; one that comes late by another time may do clearly better as a held
+        torque behind a delay or a lag: its means over samples lag too. A torque that was held while
+        causes were missing may do clearly better as a signal beside them, and so may a signal as a
+        held torque, where no delay was sought.
 
         Args:
             best: what was found.

@@ -17,6 +17,7 @@ from gap_diagnosis.model.rig_model import Model
 from gap_diagnosis.outcome.cause import LEAST_PRESENT, MOST_SHARE
 from gap_diagnosis.outcome.gap_size import Estimate
 from gap_diagnosis.outcome.verdict_words import explanation
+from gap_diagnosis.searching import _again
 from gap_diagnosis.verdict import kept_causes as kept_causes_module
 from gap_diagnosis.verdict.kept_causes import kept
 from gap_diagnosis.verdict.named_twice import twice
@@ -37,6 +38,7 @@ from gap_diagnosis.verdict.tested_causes import causes_with_tests
 from gap_diagnosis.which import stepwise
 from gap_diagnosis.which.found import Found
 from gap_diagnosis.which.presence import beyond_zero, over_usual
+from gap_diagnosis.which.torque_timing import Timing
 
 BOTH = ("coulomb_friction", "viscous_friction")
 SURELY = Gain(30.0, 25.0, 1.0, 1e-5)
@@ -602,6 +604,18 @@ def test_what_was_passed_over_for_a_cause_that_goes_is_added_if_all_pass_beside_
     assert {t.effect for t in tested} == set(left.best.effects) == there
     assert set(left.doubted) == set(fits[2].effects) - there
     assert ("torque_bias" in left.alternatives) == tried
+
+
+@pytest.mark.parametrize(("before", "stays"), [(3, True), (0, False)])
+def test_what_was_found_stays_where_a_search_with_another_torque_explains_less(
+    searched, before, stays
+):
+    """Of nothing to look for the other search finds nothing, and ends by itself."""
+    fitter, fits = searched
+    found = Found(fits[: before + 1])
+    again = _again(Timing(fitter, fits[0]), found, [], lambda _: None, math.inf)
+    assert (len(again.best.effects) == 3) == stays
+    assert again.complete
 
 
 def test_what_would_leave_less_beside_the_named_causes_is_told_whole_or_not_at_all(searched):
