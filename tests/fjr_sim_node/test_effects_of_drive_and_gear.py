@@ -21,6 +21,7 @@ from scipy.integrate import quad, solve_ivp
 
 from fjr_sim_node import effects, plant
 from fjr_sim_node.plant import spring, torques
+from fjr_sim_node.simulation import rig
 
 JM, J, FSM, K0, K1 = (PAPER[name] for name in ("jm", "j", "fsm", "k0", "k1"))
 FREE_MOTOR = {**APART, **FRICTIONLESS}
@@ -240,3 +241,24 @@ def test_limits_that_are_never_reached_change_nothing():
         named("torque_speed_limit", stall_nm=1e9, no_load_rad_s=100.0),
     ):
         assert relative_rms(simulate(r, on).position, bare) < 1e-6
+
+
+@pytest.mark.parametrize(
+    "drive",
+    [
+        {"dead_band.width_nm": 1.0},
+        {"torque_saturation.limit_nm": 0.1},
+        {"torque_gain.relative_error": 0.3},
+        {"torque_slew_limit.limit_nm_s": 0.01},
+        {"delay.time_s": 0.0035},
+    ],
+)
+def test_torque_beside_a_command_does_not_pass_through_the_drive(drive):
+    p = plant.coefficients({**PAPER, **FRICTIONLESS})
+    through, bare = rig.at_rest(), rig.at_rest()
+    for k in range(50):
+        beside = 0.5 * math.sin(0.2 * k)
+        rig.hold(through, 0.0, 1e-3, p, effects.coefficients(drive), beside)
+        rig.hold(bare, 0.0, 1e-3, p, None, beside)
+    assert abs(bare[rig.MOTOR]) > 1e-5
+    assert through[rig.MOTOR] == pytest.approx(bare[rig.MOTOR], rel=1e-4)
