@@ -161,13 +161,14 @@ def hold(x, command, sample_period, p, e, prompt=0.0):
         sample_period: Ts (s).
         p: bare parameters, `plant.coefficients`.
         e: effects, `effects.coefficients`, or None.
-        prompt: torque (N m) beside the command, such as an observer's, that no dead band, limit,
-            gain or delay of the drive changes.
+        prompt: torque (N m) beside the command, such as an observer's, that no dead band, limit or
+            delay of the drive changes; an error of its gain does, as of the unit of all torques.
     """
     if e is None:
         u = command + prompt
         x[0], x[1], x[2], x[3] = advance(x[0], x[1], x[2], x[3], u, sample_period, p)
         return
+    prompt *= 1.0 + e[fx.TORQUE_GAIN_RELATIVE_ERROR]
     slewing = 0.0
     if e[fx.TORQUE_SLEW_LIMIT_LIMIT_NM_S] != math.inf:
         most = e[fx.TORQUE_SLEW_LIMIT_LIMIT_NM_S] * sample_period
