@@ -19,7 +19,6 @@
 - `screw`: a screw's drive at 250 to 1000 Hz that goes on at one speed after the other, both ways,
   with short rests; friction far above what its inertia takes, of most it falls from breakaway, and
   most have a ripple of 2 to 6 % of it. Its law is not told.
-
 - `motor`: a small motor with a brush, driven by a voltage that steps, sweeps or ramps up and down,
   at 50 to 500 Hz; its back-EMF is viscous friction, beside Coulomb friction of 3 to 15 % of the
   voltage, of half of them falling from breakaway. Half of the drivers have a dead band, a third

@@ -14,6 +14,7 @@ from .fits.gains import gain
 from .searching import stepwise
 from .verdict.contenders import tied_fits
 from .verdict.kept_causes import kept
+from .verdict.not_named import beyond_named
 from .verdict.tested_causes import Tested
 from .which.exchange import with_the_better_one
 from .which.found import Found
@@ -39,15 +40,22 @@ def judged(
     """
     left, tested = kept(fitter, found, scatter, progress, names, until)
     if time.monotonic() < until and _never_searched_beside(fitter, found, left):
-        left, tested = _goes_on(fitter, left, tested, scatter, names, progress, until)
+        others = [name for name in names if name not in left.doubted]
+        progress("search beside what is kept")
+        more = stepwise(fitter, others, progress, until).go_on(_begun_with(left))
+        if {*more.best.effects} != {*left.best.effects}:
+            again, tests = kept(fitter, more, scatter, progress, others, until)
+            if gain(fitter, again.best, left.best).present:
+                found, left, tested = more, again, tests
     progress("what may stand in for a cause")
     tied = tied_fits(fitter, left, tested, names)
     if (anew := with_the_better_one(left, tied, fitter)) and time.monotonic() < until:
         progress(f"search with {anew.best.effects[-1]}")
-        anew = stepwise(fitter, names, progress, until).go_on(anew)
-        left, tested = kept(fitter, anew, scatter, progress, names, until)
+        found = stepwise(fitter, names, progress, until).go_on(anew)
+        left, tested = kept(fitter, found, scatter, progress, names, until)
         tied = tied_fits(fitter, left, tested, names)
-    return left, tested, tied
+    said = beyond_named(fitter, found.best, left.best, left.doubted)
+    return replace(left, notes=(*left.notes, *said)), tested, tied
 
 
 def _never_searched_beside(fitter: CellFitter, found: Found, left: Found) -> bool:
@@ -62,29 +70,11 @@ def _never_searched_beside(fitter: CellFitter, found: Found, left: Found) -> boo
     return all(causes != {*fit.effects} for fit in found.steps)
 
 
-def _goes_on(
-    fitter: CellFitter,
-    left: Found,
-    tested: list[Tested],
-    scatter: Mapping[str, float],
-    names: Sequence[str],
-    progress: Progress,
-    until: float,
-) -> tuple[Found, list[Tested]]:
-    """Search beside what is kept, without what has gone; return what is kept then, if that gains.
-
-    Arguments are those of `judged`, with what is kept and its tests.
-    """
-    others = [name for name in names if name not in left.doubted]
-    progress("search beside what is kept")
-    begun = replace(
+def _begun_with(left: Found) -> Found:
+    """Return what is kept as a search may go on from it, which changes these lists."""
+    return replace(
         left,
         steps=[*left.steps],
         rivals={**left.rivals},
         alternatives={**left.alternatives},
     )
-    more = stepwise(fitter, others, progress, until).go_on(begun)
-    if {*more.best.effects} == {*left.best.effects}:
-        return left, tested
-    more, tests = kept(fitter, more, scatter, progress, others, until)
-    return (more, tests) if gain(fitter, more.best, left.best).present else (left, tested)

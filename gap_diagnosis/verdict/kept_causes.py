@@ -19,7 +19,7 @@ from ..which.equivalents import founded
 from ..which.found import Found
 from .judgement import FEWEST_PARTS
 from .named_twice import twice
-from .not_named import beyond_named, unsure, why_not
+from .not_named import unsure, why_not
 from .passed_over import beside, passed_over
 from .spoiling import spoils, unspoiled
 from .staying import LEAST_BEARING, SURE, bases_of, bears, guesses, lacked_frictions, with_borne
@@ -119,7 +119,6 @@ def kept(
     doubted = {e: p for e, p in left.doubted.items() if e not in left.best.effects}
     notes = left.notes + [s for e in doubted for s in left.why_not.get(e, [])]
     notes += unsure({e: p for e, p in doubted.items() if e in left.nearly_named})
-    notes += beyond_named(fitter, found.best, left.best, doubted)
     if tested and any(len(fit.effects) != count for count, fit in enumerate(steps)):
         steps = [steps[0], *one_by_one(fitter, left.best, tested)]
     alike = {**found.alternatives, **keeping.taken_up}
