@@ -23,6 +23,9 @@
   at 50 to 500 Hz; its back-EMF is viscous friction, beside Coulomb friction of 3 to 15 % of the
   voltage, of half of them falling from breakaway. Half of the drivers have a dead band, a third
   act one or two samples late. Angles have 500 to 4096 counts.
+- `rotor`: a motor with strong cogging that turns at one speed, or at a few, one way or both, at 500
+  to 1000 Hz; Coulomb and viscous friction, which one speed does not tell apart. Its law is not
+  told, and two thirds of the records begin with the start from rest.
 
 Friction scatters by 2 % from run to run, beside a torque that wanders.
 """
@@ -406,7 +409,32 @@ def motor(rng: np.random.Generator) -> Machine:
     return Machine(truth, rate, runs)
 
 
+def rotor(rng: np.random.Generator) -> Machine:
+    """Draw a motor with cogging that turns on and on."""
+    rate, seconds = float(rng.choice([500, 1000])), float(rng.choice([10, 20, 30]))
+    inertia, swings_hz = 10.0 ** rng.uniform(-5, -3), rng.uniform(8, 40)
+    cycles = float(rng.choice([12, 24, 36, 42, 72, 84]))
+    least = 2.0 * np.pi * swings_hz / cycles  # below about this speed cogging stops it
+    fastest = least * rng.uniform(2, 6)
+    truth = {"inertia": inertia, "ripple": inertia * (2.0 * np.pi * swings_hz) ** 2 / cycles}
+    truth["coulomb"] = truth["ripple"] * rng.uniform(0.1, 0.8)
+    truth["viscous"] = truth["coulomb"] / fastest * rng.uniform(0.2, 1.5)
+    step, bandwidth = 2.0 * np.pi / 2.0 ** rng.integers(12, 18), 2.0 * np.pi * rng.uniform(2, 8)
+    runs, ways, skipped = [], rng.integers(1, 3), int(rate) * int(rng.random() < 1.0 / 3.0)
+    for _ in range(rng.integers(1, 4)):
+        speeds = fastest * rng.uniform(0.6, 1.0, rng.integers(1, 4))
+        each = int(seconds * rate / (ways * speeds.size))
+        wanted = np.concatenate([np.full(each, s) for one in speeds for s in (one, -one)[:ways]])
+        found = run_of(
+            truth, wanted, rate, rng, 0.03, gain=inertia * bandwidth,
+            integral=inertia * bandwidth**2 / 4.0, cycles=cycles, step=step,
+        )[:, skipped:]  # fmt: skip
+        torque = found[1] + 0.02 * np.std(found[1]) * rng.standard_normal(found.shape[1])
+        runs.append(np.array([np.arange(torque.size) / rate, found[0], torque]))
+    return Machine(truth, rate, runs)
+
+
 KINDS: dict[str, Callable[[np.random.Generator], Machine]] = {
     "swing": swing, "stairs": stairs, "fan": fan, "leg": leg, "servo": servo,
-    "stage": stage, "screw": screw, "motor": motor,
+    "stage": stage, "screw": screw, "motor": motor, "rotor": rotor,
 }  # fmt: skip

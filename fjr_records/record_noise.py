@@ -2,7 +2,8 @@
 
 Encoder noise is white, a motion of masses is not: it falls off by four powers of frequency in
 power. So the highest lines show the noise of the position where they are flat. Where a record
-stands still its own scatter shows it, and where a reference was played twice half the power of the
+stands still its own scatter shows it, unless that is far from white: an axis that starts may seem
+to stand beside the many turns that follow. Where a reference was played twice half the power of the
 difference does, line by line, friction that scatters from run to run included. An encoder that
 counts in steps rounds, which is noise of a variance of step^2/12 whatever else is seen: one that
 stands still reads the same count for ever.
@@ -43,6 +44,7 @@ _STILL = 1e-3  # of the travelled range: the most that a standing axis moves
 _LEAST_STILL = 50  # samples
 _SCATTERS = 1e-9  # of the travelled range: less is the arithmetic's
 _QUIETEST = 0.1  # of the pieces that stand still: in others the motion may still settle
+_WHITE = 3.0  # times what second differences show of white noise: more scatter is not white
 
 
 @dataclass(frozen=True)
@@ -105,17 +107,24 @@ def record_noise(records: RecordSet) -> RecordNoise:
 
 
 def _seen(records: RecordSet, rounding: float) -> RecordNoise:
-    """Return the noise that scatter shows; what stands still without any shows that of rounding."""
+    """Return the noise that scatter shows; what stands still without any shows that of rounding.
+
+    White noise of a standstill is in second differences of the whole record, beside its motion.
+    """
     repeated = _of_differences([*_between_repeats(records), *_between_periods(records)])
     if repeated is not None:
         return RecordNoise("repeats", repeated)
     still = [s for s in map(_standstill, records.records) if s is not None]
     scatter = float(np.sqrt(np.mean(np.square(still)))) if still else 0.0
-    if still and max(scatter, rounding) > 0.0:
+    stands = bool(still) and max(scatter, rounding) > 0.0
+    white = max(_steps(r.position) or 0.0 for r in records.records)
+    if stands and scatter <= max(_WHITE * white, math.sqrt(12.0) * rounding):
         return RecordNoise("standstill", scatter)
     found = [floor for floor in (_floor(r.position) for r in records.records) if floor is not None]
-    if found:
+    if found and not (stands and np.median(found) > scatter):
         return RecordNoise("residual", float(np.median(found)))
+    if stands:
+        return RecordNoise("standstill", scatter)
     return RecordNoise("none", float("nan"))
 
 

@@ -137,7 +137,7 @@ DRIVE: tuple[Effect, ...] = (
             "command",
         ),
         "dead zone of an amplifier; Tao, Kokotovic 1994, IEEE TAC 39(1)",
-        (size("width_nm", "N m", "Half width of the dead band"),),
+        (size("width_nm", "N m", "Half width of the dead band", fit=(0.0, 0.3)),),
         ({"width_nm": (0.003, 0.03)},),
         of_command=True,
         takes_from="coulomb_friction",

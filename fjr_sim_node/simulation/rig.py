@@ -123,20 +123,23 @@ def limited(command, limit, knee):
 
 
 @jit
-def asked(command, e):
-    """Return what a drive without slew limit and gain error gives of a command (N m)."""
+def asked(command, prompt, e):
+    """Return what a drive without slew limit and gain error gives of a command (N m).
+
+    What is prompt has no part in the dead band; see `hold`.
+    """
     band = e[fx.DEAD_BAND_WIDTH_NM]
-    torque = command - min(max(command, -band), band)
+    torque = command - min(max(command, -band), band) + prompt
     return limited(torque, e[fx.TORQUE_SATURATION_LIMIT_NM], e[fx.TORQUE_SATURATION_KNEE])
 
 
 @jit
-def driven(x, command, sample_period, e):
+def driven(x, command, prompt, sample_period, e):
     """Return the torque of the drive over a sample (N m): dead band, limit, slew limit, gain.
 
     A torque that slews is held at its mean over the sample.
     """
-    torque = asked(command, e)
+    torque = asked(command, prompt, e)
     if e[fx.TORQUE_SLEW_LIMIT_LIMIT_NM_S] != math.inf:
         most = e[fx.TORQUE_SLEW_LIMIT_LIMIT_NM_S] * sample_period
         change = torque - x[_SLEWED]
@@ -161,37 +164,37 @@ def hold(x, command, sample_period, p, e, prompt=0.0):
         sample_period: Ts (s).
         p: bare parameters, `plant.coefficients`.
         e: effects, `effects.coefficients`, or None.
-        prompt: torque (N m) beside the command that no delay holds up, such as an observer's.
+        prompt: torque (N m) beside the command that no delay holds up and no dead band swallows,
+            such as an observer's: where a command is too small to act, the observer holds on.
     """
     if e is None:
         u = command + prompt
         x[0], x[1], x[2], x[3] = advance(x[0], x[1], x[2], x[3], u, sample_period, p)
         return
     more = 0.0
-    if e[fx.DELAY_TIME_S] == 0.0:
-        command += prompt
-    elif prompt != 0.0:
-        more = asked(command + prompt, e) - asked(command, e)
+    if e[fx.DELAY_TIME_S] != 0.0 and prompt != 0.0:
+        more = asked(command, prompt, e) - asked(command, 0.0, e)
         more *= 1.0 + e[fx.TORQUE_GAIN_RELATIVE_ERROR]
+        prompt = 0.0
     slewing = 0.0
     if e[fx.TORQUE_SLEW_LIMIT_LIMIT_NM_S] != math.inf:
         most = e[fx.TORQUE_SLEW_LIMIT_LIMIT_NM_S] * sample_period
-        slewing = min(abs(asked(command, e) - x[_SLEWED]) / most, 1.0)
+        slewing = min(abs(asked(command, prompt, e) - x[_SLEWED]) / most, 1.0)
         if e[fx.DELAY_TIME_S] != 0.0:  # what is remembered must lie evenly in time
             slewing = 1.0
     if not slewing > _AT_ONCE:
-        _hold_with_effects(x, command, more, sample_period, p, e)
+        _hold_with_effects(x, command, prompt, more, sample_period, p, e)
         return
     parts = math.ceil(_SLEW_PARTS * slewing)
     for _ in range(parts):
-        _hold_with_effects(x, command, more, slewing * sample_period / parts, p, e)
+        _hold_with_effects(x, command, prompt, more, slewing * sample_period / parts, p, e)
     if slewing < 1.0:
-        _hold_with_effects(x, command, more, (1.0 - slewing) * sample_period, p, e)
+        _hold_with_effects(x, command, prompt, more, (1.0 - slewing) * sample_period, p, e)
 
 
 @jit
-def _hold_with_effects(x, command, more, sample_period, p, e):
-    torque = driven(x, command, sample_period, e)
+def _hold_with_effects(x, command, prompt, more, sample_period, p, e):
+    torque = driven(x, command, prompt, sample_period, e)
     friction = max(1.0 + e[fx.NONSTATIONARY_FRICTION_PER_S] * x[_TIME], 0.0)
     x[_TIME] += sample_period
     if e[fx.DELAY_TIME_S] == 0.0:

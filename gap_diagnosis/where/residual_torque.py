@@ -200,7 +200,7 @@ def _applied(
         return lines * hold
     drive = at_rest()
     for _ in range(2):  # a torque that slews is periodic from the second period on
-        given = [driven(drive, u, 1.0 / rate, e) for u in torque.tolist()]
+        given = [driven(drive, u, 0.0, 1.0 / rate, e) for u in torque.tolist()]
     return (
         np.fft.rfft(given)
         * hold

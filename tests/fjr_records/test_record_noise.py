@@ -79,6 +79,28 @@ def test_a_motion_that_settles_does_not_stand_still():
     assert found.source == "standstill" and found.std_rad == pytest.approx(STD, rel=0.2)
 
 
+def test_an_axis_that_starts_does_not_stand_beside_many_turns():
+    """Within a thousandth of the way it has yet to go, it swings into motion."""
+    rng = np.random.default_rng(8)
+    time = np.arange(8000) / RATE
+    turning = 5.0 * np.maximum(time - 0.5, 0.0)
+    starting = 0.02 * np.sin(2.0 * np.pi * 3.0 * time) * (time < 1.0)
+    position = turning + starting + STD * rng.standard_normal(time.size)
+    found = record_noise(records(position))
+    assert found.source == "residual" and found.std_rad == pytest.approx(STD, rel=0.2)
+
+
+def test_a_standstill_whose_noise_is_not_white_counts_where_no_lines_are_flat():
+    rng = np.random.default_rng(9)
+    low = butter(4, 20.0, fs=RATE, output="sos")
+    slow = sosfilt(low, rng.standard_normal(4500))
+    moving = np.cumsum(smooth(rng, 3000))
+    still = np.full(1500, moving[-1])
+    position = np.concatenate([moving, still]) + STD * slow / slow.std()
+    found = record_noise(records(position))
+    assert found.source == "standstill" and 0.4 * STD < found.std_rad < STD
+
+
 @pytest.mark.parametrize("zero", [0.0, 0.12345678])
 def test_an_encoder_that_stands_still_on_one_count_is_not_without_noise(zero):
     """It rounds: a variance of step^2/12, whatever the standstill or repeats show."""

@@ -21,6 +21,7 @@ from scipy.integrate import quad, solve_ivp
 
 from fjr_sim_node import effects, plant
 from fjr_sim_node.plant import spring, torques
+from fjr_sim_node.simulation import rig
 
 JM, J, FSM, K0, K1 = (PAPER[name] for name in ("jm", "j", "fsm", "k0", "k1"))
 FREE_MOTOR = {**APART, **FRICTIONLESS}
@@ -240,3 +241,28 @@ def test_limits_that_are_never_reached_change_nothing():
         named("torque_speed_limit", stall_nm=1e9, no_load_rad_s=100.0),
     ):
         assert relative_rms(simulate(r, on).position, bare) < 1e-6
+
+
+@pytest.mark.parametrize(
+    "drive", [{"dead_band.width_nm": 1.0}, {"dead_band.width_nm": 1.0, "delay.time_s": 0.0035}]
+)
+def test_no_dead_band_swallows_what_is_beside_a_command(drive):
+    p = plant.coefficients({**PAPER, **FRICTIONLESS})
+    through, bare = rig.at_rest(), rig.at_rest()
+    for k in range(50):
+        beside = 0.5 * math.sin(0.2 * k)
+        rig.hold(through, 0.9, 1e-3, p, effects.coefficients(drive), beside)
+        rig.hold(bare, 0.0, 1e-3, p, None, beside)
+    assert abs(bare[rig.MOTOR]) > 1e-5
+    assert through[rig.MOTOR] == pytest.approx(bare[rig.MOTOR], rel=1e-4)
+
+
+def test_a_limit_holds_for_command_and_what_is_beside_it_together():
+    """Else a limit of next to nothing would leave the motion to an observer alone."""
+    p = plant.coefficients({**PAPER, **FRICTIONLESS})
+    e = effects.coefficients({"torque_saturation.limit_nm": 0.1})
+    state, bare = rig.at_rest(), rig.at_rest()
+    for _ in range(50):
+        rig.hold(state, 2.0, 1e-3, p, e, 3.0)
+        rig.hold(bare, 0.1, 1e-3, p, None)
+    assert state[rig.MOTOR] == pytest.approx(bare[rig.MOTOR], rel=1e-4)
