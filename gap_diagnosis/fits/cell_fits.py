@@ -60,10 +60,8 @@ class CellFitter(ReweightedFits):
         if fx.EFFECTS[effect].ripple:
             tried = self.scales.cycles()
             predicted, along = self._ripples(parent)
-            cycles, seen = (
-                predicted.cycles(effect, tried, RIPPLES_TRIED),
-                along.seeds(effect, tried),
-            )
+            cycles = predicted.cycles(effect, tried, RIPPLES_TRIED)
+            seen = [*predicted.seeds(effect, cycles), *along.seeds(effect, tried)]
         elif effect in LOADS:
             seen = self._ripples(parent)[1].load(effect)
         elif effect == DRIFT:

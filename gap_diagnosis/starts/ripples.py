@@ -96,6 +96,19 @@ class Ripples:
         best = peaks(gains)[:most]
         return [self._refined(effect, likely[i], gains[i], step) for i in best]
 
+    def seeds(self, effect: str, cycles: Sequence[float]) -> list[dict[str, float]]:
+        """Return ripples of the sizes and phases that explain most, by full parameter names.
+
+        Args:
+            effect: identifier of an effect that is periodic in the motor angle.
+            cycles: its numbers of cycles per turn.
+        """
+        names, found = fx.EFFECTS[effect].names, []
+        for number in cycles:
+            size = complex(*self._fitted(effect, (number,))[0])
+            found.append(dict(zip(names, (abs(size), number, cmath.phase(size)), strict=False)))
+        return found
+
     def _gain(self, effect: str, cycles: float) -> float:
         """Return the fall of the cost by a number of cycles."""
         return self._fitted(effect, (float(cycles),))[1]

@@ -47,6 +47,19 @@ def test_ripples_are_proposed_near_enough_for_the_fit_to_find_them(effect):
     assert found == pytest.approx(truth["cycles_per_turn"], rel=0.01)
 
 
+@pytest.mark.parametrize("effect", CASES)
+def test_a_ripple_begins_near_its_size_and_phase(effect):
+    """However large: small ones that are scaled up end short of a motor with strong cogging."""
+    truth, _ = CASES[effect]
+    named = {f"{effect}.{name}": value for name, value in truth.items()}
+    fitter = CellFitter(Evidence(records(named, runs=2), NOMINAL), NOMINAL, 0.1)
+    refit = fitter.refit()
+    (seed,) = fitter._ripples(refit)[0].seeds(effect, [truth["cycles_per_turn"]])
+    size, _, phase = (seed[name] for name in fx.EFFECTS[effect].names[:3])
+    assert 0.4 < size / next(iter(truth.values())) < 1.5
+    assert math.remainder(phase - truth["phase_rad"], 2.0 * math.pi) == pytest.approx(0.0, abs=0.6)
+
+
 def test_a_ripple_of_two_harmonics_is_found_as_one_cause():
     """Taken for one harmonic its number of cycles is off, and the rest looks like another cause."""
     truth = {
