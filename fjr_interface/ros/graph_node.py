@@ -61,8 +61,8 @@ class GraphNode(Node):
             InputError: before the first run of this node, somebody else publishes the signal.
         """
         topic = publisher.topic_name
-        if not self.begun:
-            self._refuse_others(topic)
+        if not self.begun and self._beside_unnamed(topic):
+            return Lack(f"the name of the node that publishes {topic} beside this one")
         readers = [
             reader.node_name
             for reader in self.get_subscriptions_info_by_topic(topic)
@@ -76,13 +76,20 @@ class GraphNode(Node):
             return Lack(f"the subscribers of {topic}")
         return None
 
-    def _refuse_others(self, topic: str) -> None:
+    def _beside_unnamed(self, topic: str) -> bool:
+        """Tell whether somebody publishes a topic whose name is not known yet.
+
+        Raises:
+            InputError: somebody else publishes it, whose name is known.
+        """
         own = self.get_name(), self.get_namespace()
-        for writer in self.get_publishers_info_by_topic(topic):
+        writers = self.get_publishers_info_by_topic(topic)
+        for writer in writers:
             name, namespace = writer.node_name, writer.node_namespace
             if (name, namespace) != own and name != NOT_KNOWN_YET:
                 who = f"{namespace.rstrip('/')}/{name}"
                 raise _taken(f"The node {who}", topic, self.context.get_domain_id())
+        return any(writer.node_name == NOT_KNOWN_YET for writer in writers)
 
     def unwritten(self, subscription: Subscription, writer: str) -> Lack | None:
         """Return that a subscription has no publisher yet, None if it has.
