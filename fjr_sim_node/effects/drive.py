@@ -26,6 +26,10 @@ the next, and a knee is felt below its limit."""
 _LINE_SHARES = (0.3, 0.45, 0.6, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95, 1.0, 1.05)
 """Stall torques over the one whose line the record just reaches."""
 
+_WIDEST = 0.3
+"""Greatest dead band that is fitted over the greatest commanded torque: behind a wider one hardly
+any command would act, and an observer alone would move a model."""
+
 _PERIODS = (0.1, 0.5, 3.0, 10.0, 30.0)
 
 DRIVE: tuple[Effect, ...] = (
@@ -137,7 +141,7 @@ DRIVE: tuple[Effect, ...] = (
             "command",
         ),
         "dead zone of an amplifier; Tao, Kokotovic 1994, IEEE TAC 39(1)",
-        (size("width_nm", "N m", "Half width of the dead band", fit=(0.0, 0.3)),),
+        (size("width_nm", "N m", "Half width of the dead band", fit=(0.0, _WIDEST)),),
         ({"width_nm": (0.003, 0.03)},),
         of_command=True,
         takes_from="coulomb_friction",

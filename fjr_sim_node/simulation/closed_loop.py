@@ -4,8 +4,9 @@ At sample k the encoder gives y = th + noise, the controller answers with u = sa
 and u is held to the next sample: the lockstep of the graph. Where the command is given, such as a
 recorded torque, the law is an observer: with the recorded position as its reference it holds the
 model to the recorded motion. Its torque is not late by the delay of a drive, which would make it
-swing; what else a drive does to a torque it does to that one (but for a slew limit beside a delay),
-for else a drive that lets little through would be explained best of all.
+swing, nor swallowed by a dead band; what else a drive does to a torque it does to that one (but for
+a slew limit beside a delay), for else a drive that lets little through would be explained best of
+all.
 """
 
 from __future__ import annotations

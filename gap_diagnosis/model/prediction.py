@@ -9,7 +9,8 @@ with the delay of the drive, D, and all that follows it, G. The true model then 
 without noise, whatever the controller was; a wrong one has the prediction error
 (1 + G L)^-1 (y - G D u). The observer keeps open-loop drift and sticking from growing, at a price:
 below its crossover it hides part of what a wrong model does. A delay that is tried does not make it
-swing, since it is not late by it; what else a drive does to the torque, it does to the observer's.
+swing, since it is not late by it, and a dead band does not swallow what it adds; what else a drive
+does to the torque, it does to the observer's.
 """
 
 from __future__ import annotations

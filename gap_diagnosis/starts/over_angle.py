@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from scipy.fft import ifft, next_fast_len
+
+from fjr_sim_node import effects as fx
 
 _PLACES = 8  # of the angle, in a wave of the greatest number beyond the least
 
@@ -50,3 +54,24 @@ def peaks(gains: np.ndarray) -> np.ndarray:
     padded = np.concatenate([[-1.0], gains, [-1.0]])
     found = np.flatnonzero((gains >= padded[:-2]) & (gains > padded[2:]))
     return np.asarray(found[np.argsort(-gains[found])])
+
+
+def ripple_of(effect: str, cycles: float, sizes: np.ndarray) -> dict[str, float]:
+    """Return a ripple without a second harmonic, by full parameter names, no greater than may be.
+
+    Args:
+        effect: identifier of an effect that is periodic in the motor angle.
+        cycles: its number per turn.
+        sizes: of its sine and cosine, (2,).
+    """
+    values: Mapping[str, float] = {
+        "size": float(np.hypot(*sizes)),
+        "cycles": float(cycles),
+        "angle": float(np.arctan2(sizes[1], sizes[0])),
+    }
+    entry = fx.EFFECTS[effect]
+    return {
+        name: min(values[parameter.role], parameter.high)
+        for name, parameter in zip(entry.names, entry.parameters, strict=True)
+        if parameter.role in values and not parameter.name.startswith("second")
+    }

@@ -28,7 +28,7 @@ from ..model.evidence import Evidence
 from ..model.rig_model import Model
 from ..model.small_changes import averaged_over, changes, pulls
 from ..model.steady_runs import SteadyRuns
-from .over_angle import peaks, transformed, waves
+from .over_angle import peaks, ripple_of, transformed, waves
 
 _ALL = 120  # numbers of ripples of which each is calculated
 _SOME = 60  # of more than that, calculated wherever they lie, and as many that promise most
@@ -103,11 +103,7 @@ class Ripples:
             effect: identifier of an effect that is periodic in the motor angle.
             cycles: its numbers of cycles per turn.
         """
-        names, found = fx.EFFECTS[effect].names, []
-        for number in cycles:
-            size = complex(*self._fitted(effect, (number,))[0])
-            found.append(dict(zip(names, (abs(size), number, cmath.phase(size)), strict=False)))
-        return found
+        return [ripple_of(effect, c, self._fitted(effect, (c,))[0]) for c in cycles]
 
     def _gain(self, effect: str, cycles: float) -> float:
         """Return the fall of the cost by a number of cycles."""

@@ -11,7 +11,7 @@ are starting points as they are.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
@@ -21,7 +21,7 @@ from fjr_sim_node import effects as fx
 
 from ..model.evidence import Evidence
 from ..model.rig_model import Model
-from .over_angle import peaks, transformed
+from .over_angle import peaks, ripple_of, transformed
 from .seen_inertia import SeenInertia
 from .seen_resonance import hidden, torque_of_mass, with_mass
 from .seen_together import LAWS, Seen, heavier, load_parameters, load_torques, solved
@@ -238,7 +238,7 @@ class SeenTorques:
             return float(missing @ (waves @ sizes)), sizes
 
         explained = np.array([fitted(cycles)[0] for cycles in tried])
-        return [_seed(effect, tried[k], fitted(tried[k])[1]) for k in _best(explained)]
+        return [ripple_of(effect, tried[k], fitted(tried[k])[1]) for k in _best(explained)]
 
     def _factor(self, effect: str) -> np.ndarray | None:
         """Return what the sine of a ripple is multiplied by to be a torque on the motor."""
@@ -267,20 +267,6 @@ def _likely(pull: np.ndarray, angle: np.ndarray, tried: np.ndarray) -> np.ndarra
     even = np.linspace(0, tried.size - 1, half).astype(int)
     strongest = peaks(np.abs(transformed(pull, angle, tried)))[:half]
     return tried[np.union1d(even, strongest)]
-
-
-def _seed(effect: str, cycles: float, sizes: np.ndarray) -> dict[str, float]:
-    values: Mapping[str, float] = {
-        "size": float(np.hypot(*sizes)),
-        "cycles": float(cycles),
-        "angle": float(np.arctan2(sizes[1], sizes[0])),
-    }
-    entry = fx.EFFECTS[effect]
-    seed: dict[str, float] = {}
-    for name, parameter in zip(entry.names, entry.parameters, strict=True):
-        if parameter.role in values and not parameter.name.startswith("second"):
-            seed[name] = values[parameter.role]
-    return seed
 
 
 def _best(explained: np.ndarray) -> list[int]:

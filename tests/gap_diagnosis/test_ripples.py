@@ -34,11 +34,16 @@ CASES = {
 """Truth, and how near a proposed number of cycles comes to it."""
 
 
+def of_case(effect: str) -> CellFitter:
+    """Return what fits records of a rig with one effect of `CASES`."""
+    named = {f"{effect}.{name}": value for name, value in CASES[effect][0].items()}
+    return CellFitter(Evidence(records(named, runs=2), NOMINAL), NOMINAL, 0.1)
+
+
 @pytest.mark.parametrize("effect", CASES)
 def test_ripples_are_proposed_near_enough_for_the_fit_to_find_them(effect):
     truth, off = CASES[effect]
-    named = {f"{effect}.{name}": value for name, value in truth.items()}
-    fitter = CellFitter(Evidence(records(named, runs=2), NOMINAL), NOMINAL, 0.1)
+    fitter = of_case(effect)
     refit = fitter.refit()
     proposed = fitter._ripples(refit)[0].cycles(effect, fitter.scales.cycles(), 4)
     assert min(abs(np.array(proposed) - truth["cycles_per_turn"])) <= off
@@ -49,15 +54,43 @@ def test_ripples_are_proposed_near_enough_for_the_fit_to_find_them(effect):
 
 @pytest.mark.parametrize("effect", CASES)
 def test_a_ripple_begins_near_its_size_and_phase(effect):
-    """However large: small ones that are scaled up end short of a motor with strong cogging."""
     truth, _ = CASES[effect]
-    named = {f"{effect}.{name}": value for name, value in truth.items()}
-    fitter = CellFitter(Evidence(records(named, runs=2), NOMINAL), NOMINAL, 0.1)
-    refit = fitter.refit()
-    (seed,) = fitter._ripples(refit)[0].seeds(effect, [truth["cycles_per_turn"]])
+    fitter = of_case(effect)
+    (seed,) = fitter._ripples(fitter.refit())[0].seeds(effect, [truth["cycles_per_turn"]])
     size, _, phase = (seed[name] for name in fx.EFFECTS[effect].names[:3])
     assert 0.4 < size / next(iter(truth.values())) < 1.5
     assert math.remainder(phase - truth["phase_rad"], 2.0 * math.pi) == pytest.approx(0.0, abs=0.6)
+
+
+def turned(speed: float, cogging: float, cycles: float, seed: int) -> Record:
+    """Return a motor that turns both ways against cogging (N m), 8 s at 500 Hz, its loop not told."""
+    rng, rows, angle, own, sum_ = np.random.default_rng(seed), [], 0.0, speed, 0.0
+    for number in range(4000):
+        error = (speed if number % 2000 < 1000 else -speed) - own
+        sum_ += error / 500.0
+        torque = 1e-3 + 4e-4 * error + 8e-3 * sum_
+        rows.append((angle + 1e-5 * rng.standard_normal(), torque))
+        for _ in range(8):
+            against = 1e-3 * math.copysign(1.0, own) - cogging * math.sin(cycles * angle + 0.7)
+            own += (torque - against) / 2e-5 / 4000.0
+            angle += own / 4000.0
+    position, torques = np.array(rows).T
+    description = RecordDescription.of("test", sample_rate_hz=500.0, realization=seed, levels=1)
+    return Record(f"run_{seed}", description, None, torques, position, None)
+
+
+def test_a_ripple_as_strong_as_the_motor_begins_with_its_size():
+    """Small ripples that are scaled up end far short of it."""
+    runs = tuple(turned(speed, 6e-3, 42.0, seed) for seed, speed in enumerate((9.0, 11.0)))
+    rigid = {"j": 0.0, "fs": 0.0, "fv": 0.0, "k0": math.inf, "k1": 0.0}
+    nominal = {"jm": 2e-5, "fsm": 1e-3, "fvm": 0.0, **rigid}
+    evidence = Evidence(RecordSet("test", 500.0, runs), nominal)
+    fitter = CellFitter(evidence, Model.nominal(nominal).plant, 0.1)
+    refit = fitter.refit()
+    _, space, point = fitter.screening(refit, "cogging").proposals()[0]
+    begins = space.model(point).effects
+    assert begins["cogging.cycles_per_turn"] == pytest.approx(42.0, abs=0.05)
+    assert begins["cogging.amplitude_nm"] == pytest.approx(6e-3, rel=0.4)
 
 
 def test_a_ripple_of_two_harmonics_is_found_as_one_cause():
