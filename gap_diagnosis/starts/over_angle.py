@@ -1,4 +1,4 @@
-"""Waves over an angle, the transform over it of signals of time for all numbers, and its peaks."""
+"""Ripples and their waves over an angle, the transform of signals for all numbers, its peaks."""
 
 from __future__ import annotations
 

@@ -63,7 +63,7 @@ def test_a_ripple_begins_near_its_size_and_phase(effect):
 
 
 def turned(speed: float, cogging: float, cycles: float, seed: int) -> Record:
-    """Return a motor that turns both ways against cogging (N m), 8 s at 500 Hz, its loop not told."""
+    """Return a motor that turns both ways against cogging (N m); its loop is not told."""
     rng, rows, angle, own, sum_ = np.random.default_rng(seed), [], 0.0, speed, 0.0
     for number in range(4000):
         error = (speed if number % 2000 < 1000 else -speed) - own
