@@ -274,9 +274,10 @@ class CellFitter(ReweightedFits):
 
     def _ripples(self, parent: CellFit) -> tuple[Ripples, SeenTorques]:
         if self._rippled is None or self._rippled[0] is not parent:
-            weight, solution = self.weights.weight(parent.variance), parent.solution
+            weight, ended = self.weights.weight(parent.variance), parent.solution
             at = self.evidence, self.fit_parts, parent.model
-            self._rippled = parent, (Ripples(*at, weight, solution), SeenTorques(*at))
+            ripples = Ripples(*at, weight, ended.residuals, ended.jacobian)
+            self._rippled = parent, (ripples, SeenTorques(*at))
         return self._rippled[1]
 
     def _space(self, parent: CellFit, seed: Mapping[str, float]) -> Space:

@@ -32,6 +32,7 @@ NOTE = (
 _INERTIA_SHARE = 0.05  # of the rms torque: the most that inertia may take,
 _QUICK = 0.1  # but for such a part of the time: a sweep turns round
 _NOISE_SHARE = 0.2  # of that torque: what noise alone may feign once the position is averaged,
+_CLEAR = 2.0  # times what noise feigns: more is motion
 _LONGEST_S = 0.2  # over no longer than that,
 _HIDDEN = 0.3  # and no longer than leaves out this much of the torque: inertia may take that
 _STATIONS = 4000  # of all runs together
@@ -102,23 +103,31 @@ def _enough(found: Sequence[tuple[Record, np.ndarray, np.ndarray]]) -> bool:
 def _inertia_share(record: Record, rate: float, inertia: float, noise_rad: float) -> np.ndarray:
     """Return the torque that inertia takes at each sample, over the recorded rms torque.
 
-    The position is averaged over as many samples as noise calls for, which feigns motion. Torque
-    that is quicker than that may move the inertia unseen.
+    The position is averaged over as many samples as noise calls for, which feigns motion; over
+    fewer, where most of the time more is seen than that: an axis that turns on and on swings at the
+    ripples that it passes, faster than long averages show. Torque that is quicker than that may
+    move the inertia unseen.
     """
     whole = max(float(np.sqrt(np.mean(record.torque**2))), 1e-300)
     for samples in range(1, max(int(_LONGEST_S * rate), 1) + 1):
         # white noise, averaged twice, in the second difference
         feigned = noise_rad * rate**2 * (np.sqrt(6.0) if samples == 1 else 2.0 / samples**2)
-        if inertia * feigned <= _NOISE_SHARE * _INERTIA_SHARE * whole:
-            position, torque = (
-                uniform_filter1d(uniform_filter1d(signal, samples), samples)
-                for signal in (record.position, record.torque)
-            )
-            if np.sqrt(np.mean((record.torque - torque) ** 2)) > _HIDDEN * whole:
+        feigned_share = inertia * feigned / whole
+        position = _smoothed(record.position, samples)
+        share = inertia * np.pad(np.abs(np.diff(position, 2)), 1, mode="edge") * rate**2 / whole
+        if np.median(share) > max(_CLEAR * feigned_share, _INERTIA_SHARE):
+            return share
+        if feigned_share <= _NOISE_SHARE * _INERTIA_SHARE:
+            hidden = record.torque - _smoothed(record.torque, samples)
+            if np.sqrt(np.mean(hidden**2)) > _HIDDEN * whole:
                 break
-            acceleration = np.abs(np.diff(position, 2)) * rate**2
-            return inertia * np.pad(acceleration, 1, mode="edge") / whole
+            return share
     return np.full(record.samples, np.inf)
+
+
+def _smoothed(signal: np.ndarray, samples: int) -> np.ndarray:
+    """Return a signal averaged twice over so many samples."""
+    return np.asarray(uniform_filter1d(uniform_filter1d(signal, samples), samples))
 
 
 def _travel(position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

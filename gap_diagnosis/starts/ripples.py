@@ -7,6 +7,10 @@ number of ripples. How much is the transform of the pull over the angle, one for
 that it pulls at most are calculated, and only the best are simulated. The torque is made at each
 sample and then averaged over as many as the lines of the evidence allow. Along a steady period it
 is periodic as the motion is; along any other record the response is that from rest.
+
+A number counts for what it gains where it gains most: on all lines, or on those above one of their
+octaves (`upper_bands`). A strong ripple of a number that is off by a thousandth drifts against
+the true one, which shows on slow lines long before it does at the ripple itself.
 """
 
 from __future__ import annotations
@@ -20,7 +24,6 @@ import numpy as np
 from scipy import ndimage
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
-from fjr_kit.least_squares import Solution
 from fjr_sim_node import effects as fx
 from fjr_sim_node.theory.linear import g0
 
@@ -29,10 +32,9 @@ from ..model.rig_model import Model
 from ..model.small_changes import averaged_over, changes, pulls
 from ..model.steady_runs import SteadyRuns
 from .over_angle import peaks, ripple_of, transformed, waves
+from .promising import ALL, promising
+from .upper_bands import Gains, UpperBands
 
-_ALL = 120  # numbers of ripples of which each is calculated
-_SOME = 60  # of more than that, calculated wherever they lie, and as many that promise most
-_TINY = 1e-30
 _PARTS = (0.5, 0.25, 0.125)  # of a step, by which the best numbers are moved
 _LEAST_FIRST = 0.1  # of the second harmonic: a smaller first one is no ripple of that number
 _REST, _RESTS_S = 0.001, 0.1  # of the rms velocity: below it an axis rests, for as long at least
@@ -49,16 +51,18 @@ class Ripples:
         parts: Sequence[int],
         model: Model,
         weight: np.ndarray,
-        parent: Solution,
+        residuals: np.ndarray,
+        jacobian: np.ndarray,
     ) -> None:
         """Simulate the model's motion once.
 
         Args:
             evidence: the records.
             parts: that are fitted.
-            model: the parent's model.
+            model: beside which ripples are sought.
             weight: (errors,), one over the standard deviation of each error.
-            parent: where the parent's fit ended.
+            residuals: (errors,), the model's errors, times their weight.
+            jacobian: (errors, parameters), of these by the parameters that may follow.
         """
         self._evidence, self._parts, self._weight = evidence, tuple(parts), weight
         self._runs = sorted({evidence.parts[i].record for i in parts})
@@ -75,8 +79,7 @@ class Ripples:
         self._every = averaged_over(evidence.hop, evidence.lines, self._whole_blocks())
         self._responses = [self._response(model, index, run.size // self._every) for index, run
                            in zip(self._runs, self._angles, strict=True)]  # fmt: skip
-        self._basis = np.linalg.qr(parent.jacobian)[0]
-        self._left = self._beyond(parent.residuals)
+        self._bands = UpperBands(evidence, self._parts, jacobian, residuals)
         self._stiffness = model.plant.get("k0", 0.0)
 
     def _whole_blocks(self) -> int:
@@ -144,6 +147,12 @@ class Ripples:
 
     def _fitted(self, effect: str, cycles: Sequence[float]) -> tuple[np.ndarray, float]:
         """Return sizes of sine and cosine of each number of cycles, and the fall of the cost."""
+        sizes, falls, _ = self._gains(effect, cycles)
+        most = int(np.argmax(falls))
+        return sizes[most], float(falls[most])
+
+    def _gains(self, effect: str, cycles: Sequence[float]) -> Gains:
+        """Return what sine and cosine of each number of cycles gain from each band upwards."""
         own = []
         for number in cycles:
             moved = {
@@ -151,53 +160,51 @@ class Ripples:
                 for k, index in enumerate(self._runs)
             }
             moves = changes(self._evidence, moved, self._parts, self._every)
-            own.append(self._beyond(moves * self._weight))
-        columns = np.concatenate(own)
-        sizes = np.linalg.lstsq(columns.T, -self._left, rcond=1e-6)[0]
-        return sizes, -float(sizes @ (columns @ self._left))
+            own.append(moves * self._weight)
+        return self._bands.gains(np.concatenate(own))
 
     def _likely(self, effect: str, tried: np.ndarray, harmonics: int) -> np.ndarray:
         """Return the numbers of cycles that are worth a calculation of their own, ascending.
-
-        A ripple gains the square of what pulls at it by what it meets. The pull costs little for
-        each number; what it meets goes evenly from number to number, and is calculated for some.
 
         Args:
             effect: identifier of an effect that is periodic in the motor angle.
             tried: numbers to try, ascending in even steps.
             harmonics: of a ripple, which count together.
         """
-        if len(tried) <= _ALL:
+        if len(tried) <= ALL:
             return tried
-        pulls = [self._pulled(effect, h * tried) for h in range(1, harmonics + 1)]
-        at = np.unique(np.geomspace(1, len(tried), _SOME).astype(int)) - 1
-        met = [max(self._gain(effect, tried[k]), _TINY) / pulls[0][k] for k in at]
-        gains = np.zeros(len(tried))
-        for harmonic, pull in enumerate(pulls, 1):
-            number = np.log(harmonic * tried)
-            gains += pull * np.exp(np.interp(number, np.log(tried[at]), np.log(met)))
-        return np.union1d(tried[at], tried[peaks(gains)[: _ALL - len(at)]])
+        numbers = [h * tried for h in range(1, harmonics + 1)]
+        bands = range(len(self._bands))
+        pulls = np.array([[self._pulled(effect, n, k) for n in numbers] for k in bands])
+        return promising(tried, pulls, lambda c: self._gains(effect, (c,)).squares)
 
-    def _pulled(self, effect: str, tried: np.ndarray) -> np.ndarray:
+    def _pulled(self, effect: str, tried: np.ndarray, lowest: int = 0) -> np.ndarray:
         """Return the squares of what pulls at sine and cosine of numbers of cycles.
 
         Args:
             effect: identifier of an effect that is periodic in the motor angle.
             tried: numbers of cycles in even steps, at least two.
+            lowest: band from which upwards lines are counted.
         """
         found = np.zeros(len(tried), complex)
-        for k, pull in enumerate(self._pulls):
+        for k, pull in enumerate(self._pulls[lowest]):
             angle = self._angles[k][: pull.shape[1]]
             for place, of_slope, factor in self._factors(effect, k):
                 sums = transformed(factor[: angle.size] * pull[place], angle, tried)
                 found += 1j * tried * sums if of_slope else sums
-        return np.abs(found) ** 2 + _TINY
+        return np.abs(found) ** 2
 
     @cached_property
-    def _pulls(self) -> list[np.ndarray]:
-        """What pulls at a torque on the motor, and between link and motor, at each time, (2, N)."""
-        found = []
-        of_runs = pulls(self._evidence, self._left * self._weight, self._parts, self._every)
+    def _pulls(self) -> list[list[np.ndarray]]:
+        """What pulls at torques from each band upwards, of each run.
+
+        Each (2, N): at a torque on the motor, and between link and motor.
+        """
+        return [self._pulls_from(lowest) for lowest in range(len(self._bands))]
+
+    def _pulls_from(self, lowest: int) -> list[np.ndarray]:
+        left, found = self._bands.left(lowest), []
+        of_runs = pulls(self._evidence, left * self._weight, self._parts, self._every)
         for k, index in enumerate(self._runs):
             pull = of_runs[index][self._run_in // self._every :]
             size = self._size(k, pull.size)
@@ -274,10 +281,6 @@ class Ripples:
     def _size(self, k: int, samples: int) -> int:
         """Return of how many samples the transforms of a record are."""
         return samples if self._run_in else 2 * (self._responses[k].shape[1] - 1)
-
-    def _beyond(self, errors: np.ndarray) -> np.ndarray:
-        """Return what the parent's parameters can't follow of errors, (..., errors)."""
-        return errors - (errors @ self._basis) @ self._basis.T
 
 
 def _moves(motion: np.ndarray, least: int) -> np.ndarray:
