@@ -219,7 +219,7 @@ def test_torque_quicker_than_what_noise_hides_is_no_slow_motion():
 
 @pytest.mark.parametrize("swing_rad", [0.0, 1e-3])
 def test_an_axis_that_swings_at_ripples_is_not_slow_for_its_coarse_encoder(swing_rad):
-    """Averaged for as long as its noise calls for, the swings are gone; a loop hardly feels them."""
+    """Averaged as long as its noise calls for, the swings are gone; a loop hardly feels them."""
     rate, time = 1000.0, np.arange(10000) / 1000.0
     noise = 4e-4 * np.random.default_rng(2).standard_normal(time.size)
     position = 10.0 * time + swing_rad * np.sin(84.0 * 10.0 * time) + noise
