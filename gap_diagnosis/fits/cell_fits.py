@@ -60,8 +60,9 @@ class CellFitter(ReweightedFits):
         if fx.EFFECTS[effect].ripple:
             tried = self.scales.cycles()
             predicted, along = self._ripples(parent)
-            cycles = predicted.cycles(effect, tried, RIPPLES_TRIED)
-            seen = [*predicted.seeds(effect, cycles), *along.seeds(effect, tried)]
+            likely = predicted.seeds(effect, tried, RIPPLES_TRIED)
+            cycles = [one[f"{effect}.cycles_per_turn"] for one in likely]
+            seen = [*likely, *along.seeds(effect, tried)]
         elif effect in LOADS:
             seen = self._ripples(parent)[1].load(effect)
         elif effect == DRIFT:

@@ -18,6 +18,8 @@ ALL = 120
 _SPREAD = 60  # of more than that, calculated wherever they lie
 _ROUNDS = 3  # in which those are added that promise most:
 _NEXT = 10  # on all lines, and as many on those from one of the bands upwards
+_HIDDEN = 20.0  # gain (twice the nats) that slow lines hide
+_MOST_HIDDEN = 2  # numbers that gain so
 
 
 def promising(
@@ -44,6 +46,22 @@ def promising(
         falls = [np.exp(-np.interp(numbers, numbers[0, at], row)) for row in moved]
         new = _next((pulls * falls).sum(axis=1), known)
     return np.asarray(tried[sorted({*known, *new})])
+
+
+def leading(falls: np.ndarray, most: int) -> list[tuple[int, int]]:
+    """Return which numbers gain most, and from which band upwards lines are then counted.
+
+    On all lines first; then those that gain far more where some slow lines don't count.
+
+    Args:
+        falls: (numbers, bands), what each gains on the lines from each band upwards.
+        most: numbers on all lines.
+    """
+    on_all = [(int(i), 0) for i in peaks(falls[:, 0])[:most]]
+    greatest, lowest = falls.max(axis=1), falls.argmax(axis=1)
+    hidden = greatest - falls[:, 0] > _HIDDEN
+    above = [(int(i), int(lowest[i])) for i in peaks(greatest) if hidden[i]]
+    return on_all + above[:_MOST_HIDDEN]
 
 
 def _next(gains: np.ndarray, known: Container[int]) -> list[int]:

@@ -8,9 +8,9 @@ that it pulls at most are calculated, and only the best are simulated. The torqu
 sample and then averaged over as many as the lines of the evidence allow. Along a steady period it
 is periodic as the motion is; along any other record the response is that from rest.
 
-A number counts for what it gains where it gains most: on all lines, or on those above one of their
-octaves (`upper_bands`). A strong ripple of a number that is off by a thousandth drifts against
-the true one, which shows on slow lines long before it does at the ripple itself.
+A strong ripple of a number that is off by a thousandth drifts against the true one, which shows on
+slow lines long before it does at the ripple itself. So a number counts as well that gains far more
+on the lines from one of their octaves upwards (`upper_bands`).
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from ..model.rig_model import Model
 from ..model.small_changes import averaged_over, changes, pulls
 from ..model.steady_runs import SteadyRuns
 from .over_angle import peaks, ripple_of, transformed, waves
-from .promising import ALL, promising
+from .promising import ALL, leading, promising
 from .upper_bands import Gains, UpperBands
 
 _PARTS = (0.5, 0.25, 0.125)  # of a step, by which the best numbers are moved
@@ -86,40 +86,44 @@ class Ripples:
         """Return how many samples averages must divide: those of a steady period; 0 for any."""
         return math.gcd(self._run_in, self._angles[0].size) if self._run_in else 0
 
-    def cycles(self, effect: str, tried: np.ndarray, most: int) -> list[float]:
-        """Return the numbers of cycles per turn that promise most, best first.
+    def seeds(self, effect: str, tried: np.ndarray, most: int) -> list[dict[str, float]]:
+        """Return the ripples that promise most, by full parameter names, best first.
+
+        They have the sizes and phases that explain most. Those that promise most on all lines come
+        first, then those that the slow lines speak against.
 
         Args:
             effect: identifier of an effect that is periodic in the motor angle.
-            tried: numbers to try, ascending.
-            most: how many to return, each a maximum of its own.
+            tried: numbers of cycles per turn to try, ascending.
+            most: how many to return on all lines, each a maximum of its own.
         """
         likely, step = self._likely(effect, tried, 1), float(np.ptp(tried)) / max(len(tried) - 1, 1)
-        gains = np.array([self._gain(effect, cycles) for cycles in likely])
-        best = peaks(gains)[:most]
-        return [self._refined(effect, likely[i], gains[i], step) for i in best]
+        falls = np.array([self._gains(effect, (c,)).falls for c in likely])
+        found = [
+            self._refined(effect, likely[i], falls[i], step, lowest)
+            for i, lowest in leading(falls, most)
+        ]
+        return [ripple_of(effect, cycles, sizes) for cycles, sizes in dict(found).items()]
 
-    def seeds(self, effect: str, cycles: Sequence[float]) -> list[dict[str, float]]:
-        """Return ripples of the sizes and phases that explain most, by full parameter names.
+    def _refined(
+        self, effect: str, cycles: float, falls: np.ndarray, step: float, lowest: int
+    ) -> tuple[float, np.ndarray]:
+        """Return the number of cycles that gains most on lines from a band up, and its sizes.
 
         Args:
             effect: identifier of an effect that is periodic in the motor angle.
-            cycles: its numbers of cycles per turn.
+            cycles: a number that gains more than its neighbours.
+            falls: (bands,), what it gains.
+            step: from one number that was tried to the next.
+            lowest: band from which upwards lines are counted.
         """
-        return [ripple_of(effect, c, self._fitted(effect, (c,))[0]) for c in cycles]
-
-    def _gain(self, effect: str, cycles: float) -> float:
-        """Return the fall of the cost by a number of cycles."""
-        return self._fitted(effect, (float(cycles),))[1]
-
-    def _refined(self, effect: str, cycles: float, gain: float, step: float) -> float:
-        """Return the number of cycles that gains most, near one that gains more than its next."""
+        gain = falls[lowest]
         for part in _PARTS:
             sides = [cycles + sign * part * step for sign in (-1.0, 1.0)]
-            gains = [self._gain(effect, side) for side in sides]
+            gains = [self._gains(effect, (side,)).falls[lowest] for side in sides]
             if max(gains) > gain:
                 cycles, gain = sides[int(np.argmax(gains))], max(gains)
-        return float(cycles)
+        return float(cycles), self._gains(effect, (cycles,)).sizes[lowest]
 
     def harmonics(self, effect: str, tried: np.ndarray, most: int) -> list[dict[str, float]]:
         """Return the ripples with a second harmonic that promise most, best first.
@@ -127,29 +131,23 @@ class Ripples:
         Args:
             effect: identifier of an effect that is periodic in the motor angle.
             tried: numbers to try, ascending.
-            most: how many to return, each a maximum of its own.
+            most: how many to return on all lines, each a maximum of its own.
 
         Returns:
             values by the names of the effect's parameters.
         """
         tried = self._likely(effect, tried, 2)
-        fits = [self._fitted(effect, (float(c), 2.0 * float(c))) for c in tried]
+        gains = [self._gains(effect, (float(c), 2.0 * float(c))) for c in tried]
         names = fx.EFFECTS[effect].names
         found = []
-        for i in peaks(np.array([gain for _, gain in fits]))[:most]:
-            sizes = fits[i][0]
+        for i, lowest in leading(np.array([gain.falls for gain in gains]), most):
+            sizes = gains[i].sizes[lowest]
             first, second = complex(*sizes[:2]), complex(*sizes[2:])
             phase, size = cmath.phase(first), max(abs(first), _LEAST_FIRST * abs(second))
             bend = math.remainder(cmath.phase(second) - 2.0 * phase, 2.0 * math.pi)
             values = (size, float(tried[i]), phase, abs(second) / size, bend)
             found.append(dict(zip(names, values, strict=True)))
         return found
-
-    def _fitted(self, effect: str, cycles: Sequence[float]) -> tuple[np.ndarray, float]:
-        """Return sizes of sine and cosine of each number of cycles, and the fall of the cost."""
-        sizes, falls, _ = self._gains(effect, cycles)
-        most = int(np.argmax(falls))
-        return sizes[most], float(falls[most])
 
     def _gains(self, effect: str, cycles: Sequence[float]) -> Gains:
         """Return what sine and cosine of each number of cycles gain from each band upwards."""
