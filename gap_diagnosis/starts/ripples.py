@@ -31,7 +31,7 @@ from ..model.evidence import Evidence
 from ..model.rig_model import Model
 from ..model.small_changes import averaged_over, changes, pulls
 from ..model.steady_runs import SteadyRuns
-from .over_angle import peaks, ripple_of, transformed, waves
+from .over_angle import ripple_of, transformed, waves
 from .promising import ALL, leading, promising
 from .upper_bands import Gains, UpperBands
 
