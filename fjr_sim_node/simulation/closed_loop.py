@@ -105,12 +105,15 @@ def _run(reference, noise, sample_period, p, e, c, x, state, position, torque, l
 
 @jit
 def _run_law(
-    reference, beside, observes, noise, sample_period, substeps, p, e, x, law, state,
+    reference, beside, observes, farthest, noise, sample_period, substeps, p, e, x, law, state,
     position, torque, link, motor,
 ):  # fmt: skip
     b, forward, a, limit = law
     for k in range(reference.size):
         y = rig.measure(state, noise[k], e)
+        if not abs(y - reference[k]) <= farthest:
+            position[k:] = math.nan
+            return
         own = transfer_function.step(x, reference[k], y, b, forward, a, limit)
         u, prompt = own, 0.0
         if observes:
@@ -187,6 +190,7 @@ def simulate_law(
     controller_state: np.ndarray | None = None,
     begin: State | None = None,
     substeps: int = 1,
+    farthest: float = math.inf,
 ) -> Trajectory:
     """Simulate the loop of any linear law, from any start; see `simulate`.
 
@@ -208,6 +212,8 @@ def simulate_law(
             None for zero.
         begin: where the simulation begins, whatever the three say; None for what they say.
         substeps: parts of a sample in which the plant is integrated, at least.
+        farthest: how far from the reference the encoder may read (rad); beyond it the motion has
+            diverged. One that goes on and on takes ever more steps.
 
     Raises:
         InputError: the motion diverged, or signals or state have another length than they must.
@@ -238,6 +244,7 @@ def simulate_law(
         reference,
         beside,
         command is not None,
+        farthest,
         noise,
         1.0 / (steps * sample_rate_hz),
         substeps,

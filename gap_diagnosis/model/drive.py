@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,6 +26,7 @@ class Drive:
         elapsed_s: time since the first run began, for what drifts.
         held_at: where a link is held (rad); None for the position at the start.
         begin: state in which the simulation begins, whatever start and entry say.
+        farthest: how far from the reference the motion may go (rad) before it has diverged.
     """
 
     reference: np.ndarray
@@ -36,6 +38,7 @@ class Drive:
     added: np.ndarray | None = None
     held_at: float | None = None
     begin: State | None = None
+    farthest: float = math.inf
 
     @property
     def observed(self) -> bool:
@@ -63,7 +66,7 @@ class Drive:
         return simulate_law(
             self.reference, sample_rate_hz, p, self.law, noise, e, self.elapsed_s,
             command=self.command, added=self.added, start=self.start, held_at=self.held_at,
-            controller_state=self.entry, begin=self.begin,
+            controller_state=self.entry, begin=self.begin, farthest=self.farthest,
         )  # fmt: skip
 
     def part(self, samples: slice, begin: State | None = None) -> Drive:

@@ -8,6 +8,7 @@ the model comes to rest by itself.
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -30,6 +31,7 @@ from .steady_runs import SteadyRuns
 
 _SMALL = 1e-4  # relative: a change of an inertia that must not grow
 _NOTHING = TransferFunction.of([0.0], [1.0])
+_LOST = 100.0  # times the recorded range, off the recorded motion that an observer holds it to
 
 
 class RecordSimulator:
@@ -69,6 +71,7 @@ class RecordSimulator:
         ]
         self._speeds = [float(np.std(np.diff(r.position)) * self._rate) for r in records.records]
         self._torques = [float(np.abs(r.torque).max()) for r in records.records]
+        self._farthest = [_LOST * float(np.ptp(r.position)) or math.inf for r in records.records]
         self.crossover_hz, self._observer = model_observer(
             nominal, CROSSOVER_SHARE * top_hz, self._rate
         )
@@ -240,7 +243,7 @@ class RecordSimulator:
         start = self._starts[index]
         return Drive(
             record.position, self._observer, record.torque, start, elapsed_s=record.elapsed_s,
-            held_at=self._held_at[index],
+            held_at=self._held_at[index], farthest=self._farthest[index],
         )  # fmt: skip
 
     def disturbed(

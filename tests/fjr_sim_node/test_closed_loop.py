@@ -159,6 +159,37 @@ def test_divergence_is_one_sentence(controller, plant_values):
     assert message.count(". ") == 0
 
 
+def test_a_motion_that_is_lost_ends_as_one_that_diverges():
+    """Held by a torque that slews too slowly it swings further and further."""
+    rate, samples = 500.0, 2000
+    recorded = np.sin(np.arange(samples) / 50.0)
+    observer = TransferFunction.of([200.0, -190.0], [1.0, -0.5])
+    e = fx.coefficients({"torque_slew_limit.limit_nm_s": 5.0})
+    rotor = {
+        "jm": 0.01,
+        "j": 1e-9,
+        "k0": np.inf,
+        "k1": 0.0,
+        "fs": 0.0,
+        "fsm": 0.0,
+        "fv": 0.0,
+        "fvm": 0.0,
+    }
+
+    def held(farthest):
+        return closed_loop.simulate_law(
+            recorded, rate, plant.coefficients(plant.PLANT.check(rotor)), observer,
+            effects=e, command=np.zeros(samples), farthest=farthest,
+        )  # fmt: skip
+
+    free = held(np.inf)
+    most = np.abs(free.position - recorded).max()
+    assert most > 100.0
+    assert (held(1.01 * most).position == free.position).all()
+    with pytest.raises(InputError, match="diverges at"):
+        held(0.5 * most)
+
+
 @settings(max_examples=30)
 @given(
     st.fixed_dictionaries(
