@@ -48,7 +48,7 @@ TRANSMISSION: tuple[Effect, ...] = (
         Telltale("low amplitude, more gain below the resonance", "deflection"),
         "Nordin, Gutman 2002, Automatica 38(10), dead-zone model",
         (size("half_gap_rad", "rad", "Half the dead zone of the deflection", 0.0, 1.0),),
-        ({"half_gap_rad": (2e-3, 0.01, 0.04, 0.2)},),
+        ({"half_gap_rad": (2e-3, 0.01, 0.04, 0.2, 0.5, 1.0, 2.0, 4.0)},),
         looks_like="dead or soft zone",
         same_as="a soft zone of zero stiffness (piecewise_stiffness with soft_ratio 0)",
     ),

@@ -63,6 +63,16 @@ def test_a_spring_that_rests_beside_the_motion_is_found_in_records(rest):
         assert fit.model.effects[name] == pytest.approx(value, rel=0.1)
 
 
+@pytest.mark.parametrize("rms_rad", [(0.03, 0.06), (0.1, 0.2)])
+def test_play_wider_than_its_spring_yields_is_found_in_records(rms_rad):
+    truth = {"backlash.half_gap_rad": 0.1}
+    fitter = CellFitter(Evidence(records(truth, runs=2, rms_rad=rms_rad), NOMINAL), NOMINAL, 0.1)
+    refit = fitter.refit()
+    fit = fitter.add(refit, "backlash", fitter.screening(refit, "backlash").proposals())
+    assert fit.model.effects["backlash.half_gap_rad"] == pytest.approx(0.1, rel=0.002)
+    assert fitter.misfit(fit) < 1e-4 * fitter.misfit(refit)
+
+
 def test_lugre_friction_begins_as_the_part_of_it_that_was_fitted():
     case = simulate_case({}, seed=3, **SHORT)
     simulator = Simulator(case.recorded)
