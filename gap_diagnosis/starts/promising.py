@@ -25,7 +25,7 @@ _MOST_HIDDEN = 2  # numbers that gain so
 def promising(
     tried: np.ndarray, pulls: np.ndarray, squares: Callable[[float], np.ndarray]
 ) -> np.ndarray:
-    """Return the numbers that promise most, ascending, a few more than the least of `ALL`.
+    """Return the numbers that promise most, ascending, `ALL` of them at the most.
 
     What they move is calculated for some, and taken between them for all; then it is calculated for
     those that promise most by it, which corrects it there, and so on.

@@ -109,7 +109,7 @@ def test_a_ripple_as_strong_as_the_motor_begins_with_its_size():
     assert begins["cogging.amplitude_nm"] == pytest.approx(6e-3, rel=0.4)
 
 
-def test_a_ripple_that_the_slow_lines_speak_against_is_proposed_first():
+def test_a_ripple_that_the_slow_lines_speak_against_is_proposed():
     """Of many turns one way, a number that is off by a thousandth drifts, which slow lines show."""
     fitter = turning(one_way=True)
     ripples = fitter._ripples(fitter.refit())[0]
