@@ -87,10 +87,13 @@ def read_files(files: Sequence[str | Path], options: ImportOptions) -> Understoo
         understand(each, rate, options, _maker(each.path, controller, rate, options), faster)
         for each, rate, controller in zip(samples, rates, controllers, strict=True)
     ]
-    for record, controller, source in zip(records, controllers, sources, strict=False):
-        _check_controller(record, controller or {}, source)
+    told = []
+    for source in dict.fromkeys(sources):
+        of_it = [number for number, own in enumerate(sources) if own == source]
+        known = [(records[number], controllers[number] or {}) for number in of_it]
+        told += _check_controller(known, source)
     descriptions, notes = describe(records, options.levels, controllers, insists(options))
-    return Understood(tuple(records), tuple(descriptions), tuple(notes))
+    return Understood(tuple(records), tuple(descriptions), (*notes, *told))
 
 
 def _grid_rate(samples: Sequence[Samples]) -> float | None:
@@ -115,23 +118,52 @@ def _maker(
     return law_as_run(controller, rate_hz)
 
 
-def _check_controller(record: Record, controller: dict[str, Any], source: str) -> None:
-    """Refuse a controller, known in all its gains, that does not give the recorded torque."""
-    if "r" not in record.signals or "unknown" in controller:
-        return
+def _check_controller(known: Sequence[tuple[Record, dict[str, Any]]], source: str) -> list[str]:
+    """Refuse a controller, known in all its gains, that makes the torque of no file.
+
+    In some of the files something else may have been added to its torque.
+
+    Args:
+        known: the records that it is said to have made, each with its description.
+        source: its file.
+
+    Returns:
+        Sentences on those files whose torque it does not make.
+    """
+    off = {
+        record.path: difference
+        for record, controller in known
+        if (difference := _off(record, controller)) is not None
+    }
+    wrong = {path: difference for path, difference in off.items() if difference > WRONG_CONTROLLER}
+    if wrong and len(wrong) == len(off):
+        path, least = min(off.items(), key=lambda one: one[1])
+        raise InputError(
+            f"{source}: this controller gives a torque that differs by {min(least, 1e9):.0%} from "
+            f"that in {path}; correct gains, units or signs, or mark gains as unknown."
+        )
+    return [
+        f"{path}: the torque differs by {min(difference, 1e9):.0%} from that of {source}, which "
+        "makes that of other files; was something added to it, pushes say, or were its gains "
+        "others?"
+        for path, difference in wrong.items()
+    ]
+
+
+def _off(record: Record, controller: dict[str, Any]) -> float | None:
+    """Return the rms difference of a recorded torque from that of its law, relative to it.
+
+    None where that cannot be said: no reference, no law, gains that are not known.
+    """
+    if "r" not in record.signals or not controller or "unknown" in controller:
+        return None
     r, u, y = (record.signals[symbol] for symbol in "ruy")
     law = law_as_run(controller, record.sample_rate_hz)
-    with np.errstate(all="ignore"):
-        expected = law.torque(r, y)
     settled = slice(int(_SETTLE * u.size), None)
     scale = float(np.std(u[settled]))
     with np.errstate(all="ignore"):
-        off = float(np.std((expected - u)[settled])) / scale if scale > 0 else 0.0
-    if not off <= WRONG_CONTROLLER:
-        raise InputError(
-            f"{source}: this controller gives a torque that differs by {min(off, 1e9):.0%} from "
-            f"that in {record.path}; correct gains, units or signs, or mark gains as unknown."
-        )
+        off = float(np.std((law.torque(r, y) - u)[settled])) / scale if scale > 0 else 0.0
+    return off if off <= np.inf else np.inf  # what overflows is not a number
 
 
 def write_bags(understood: Understood, out: Path) -> list[Path]:

@@ -328,6 +328,18 @@ def test_a_controller_is_described_and_a_wrong_one_refused(tmp_path):
         read_files([file], options(controllers=(right, wrong)))
 
 
+def test_pushes_in_one_file_of_a_controller_are_told_and_not_refused(tmp_path):
+    alone, law = loop(chirp()), tmp_path / "law.yaml"
+    law.write_text("kind: pid\np: 40\n")
+    pushes = np.where(np.arange(alone["u"].size) % 400 < 200, 2.0, 0.0) * np.std(alone["u"])
+    pushed = save(tmp_path, "pushed", {**alone, "u": alone["u"] + pushes})
+    with pytest.raises(InputError, match=r"law\.yaml: .* differs by \d+% from that in .*pushed"):
+        read_files([pushed], options(controllers=(law,)))
+    both = read_files([save(tmp_path, "alone", alone), pushed], options(controllers=(law,)))
+    told = [note for note in both.notes if "differs by" in note]
+    assert len(told) == 1 and "pushed" in told[0]
+
+
 def test_dry_run_shows_what_is_understood_and_writes_nothing(tmp_path, run):
     files = [save(tmp_path, f"run{n}", loop(multisine(n // 2), noise=1e-5)) for n in range(3)]
     words = ("--sample-rate-hz", RATE_HZ, "--map", ",".join(MAP))
