@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from gap_diagnosis.any_record import investigate
 from gap_diagnosis.fits.cell_fits import CellFitter
 from gap_diagnosis.model.evidence import Evidence
-from gap_diagnosis.verdict.noisy_torque import most_noise, torque_noise
+from gap_diagnosis.which.unfelt_noise import most_noise, torque_noise
 
 COGGING = {"cogging.amplitude_nm": 6.0, "cogging.cycles_per_turn": 40.0}
 RIGID = {
