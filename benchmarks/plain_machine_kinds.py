@@ -26,8 +26,12 @@
 - `rotor`: a motor with strong cogging that turns at one speed, or at a few, one way or both, at 500
   to 1000 Hz; Coulomb and viscous friction, which one speed does not tell apart. Its law is not
   told, and two thirds of the records begin with the start from rest.
+- `bristles`: a table whose friction four elastic elements make that slip one after the other
+  (Maxwell slip), under a position loop whose targets are noise of 0.1 to 3 Hz: of a third of the
+  way over which it yields, of one and a half, and of twenty. The force is logged with 0 to 3 % of
+  noise that the table does not feel, at 1 kHz. Its law is not told.
 
-Friction scatters by 2 % from run to run, beside a torque that wanders.
+Friction scatters by 2 % from run to run, beside a torque that wanders (not of `bristles`).
 """
 
 from __future__ import annotations
@@ -45,6 +49,7 @@ from fjr_records.importers.importer import import_files
 from fjr_records.importers.record_file import ImportOptions
 
 BRISTLE, ACCELERATES_S, INNER_HZ, SMOOTHED = 0.003, 0.5, 8000.0, 0.3
+_YIELDS = np.array([0.1, 0.25, 0.5, 1.0])  # of the way over which all elements yield
 SIZES = {
     "gravity.torque_nm": "gravity",
     "coulomb_friction.motor_nm": "coulomb",
@@ -434,7 +439,51 @@ def rotor(rng: np.random.Generator) -> Machine:
     return Machine(truth, rate, runs)
 
 
+@numba.njit  # type: ignore[untyped-decorator]
+def slipped(wanted, stiff, slips, gain, damping, mass, viscous, step, dt, inner):
+    """Return position and force of a mass on elements that yield (N/m), then slip (N)."""
+    found, stretched, h = np.zeros((2, wanted.size)), np.zeros(stiff.size), dt / inner
+    place, speed, smooth = 0.0, 0.0, 0.0
+    for k in range(wanted.size):
+        counted = np.round(place / step) * step
+        smooth += SMOOTHED * (speed - smooth)
+        force = gain * (wanted[k] - counted) - damping * smooth
+        found[0, k], found[1, k] = counted, force
+        for _ in range(inner):
+            held = 0.0
+            for e in range(stiff.size):
+                most = slips[e] / stiff[e]
+                stretched[e] = min(max(stretched[e] + speed * h, -most), most)
+                held += stiff[e] * stretched[e]
+            speed += h * (force - viscous * speed - held) / mass
+            place += h * speed
+    return found
+
+
+def bristles(rng: np.random.Generator) -> Machine:
+    """Draw a table that moves within and beyond what its friction yields over."""
+    rate, mass, samples = 1000.0, 10.0 ** rng.uniform(0, 1.5), 15000
+    coulomb, over = mass * rng.uniform(2, 6), 10.0 ** rng.uniform(-4.3, -3.5)
+    truth = {"inertia": mass, "coulomb": coulomb, "viscous": coulomb * rng.uniform(0.5, 4)}
+    natural, noise = 2.0 * np.pi * 20.0, rng.uniform(0.0, 0.03)
+    lines, runs = np.fft.rfftfreq(samples, 1.0 / rate), []
+    for times in (0.3, 1.5, 20.0):
+        share = 1.0 + 0.02 * rng.standard_normal()
+        slips = np.full(4, share * coulomb / 4.0)
+        inside = (lines >= 0.1) & (lines <= 3.0)
+        phases = np.where(inside, np.exp(2j * np.pi * rng.random(lines.size)), 0.0)
+        wanted = np.fft.irfft(phases, samples)
+        found = slipped(
+            times * over * wanted / np.std(wanted), slips / (over * _YIELDS), slips,
+            mass * natural**2, 1.6 * mass * natural, mass, share * truth["viscous"], 1e-8,
+            1.0 / rate, 20,
+        )  # fmt: skip
+        force = found[1] + noise * np.std(found[1]) * rng.standard_normal(samples)
+        runs.append(np.array([np.arange(samples) / rate, found[0], force]))
+    return Machine(truth, rate, runs, position="m")
+
+
 KINDS: dict[str, Callable[[np.random.Generator], Machine]] = {
     "swing": swing, "stairs": stairs, "fan": fan, "leg": leg, "servo": servo,
-    "stage": stage, "screw": screw, "motor": motor, "rotor": rotor,
+    "stage": stage, "screw": screw, "motor": motor, "rotor": rotor, "bristles": bristles,
 }  # fmt: skip
