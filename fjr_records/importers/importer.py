@@ -144,8 +144,8 @@ def _check_controller(known: Sequence[tuple[Record, dict[str, Any]]], source: st
         )
     return [
         f"{path}: the torque differs by {min(difference, 1e9):.0%} from that of {source}, which "
-        "makes that of other files; was something added to it, pushes say, or were its gains "
-        "others?"
+        "makes that of other files: something was added to it, pushes say, or its gains were "
+        "others"
         for path, difference in wrong.items()
     ]
 

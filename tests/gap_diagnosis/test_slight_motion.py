@@ -78,7 +78,7 @@ def test_what_a_run_within_the_bristles_misses_takes_no_name_away():
 
 def test_bristles_are_found_though_they_yield_to_noise_of_the_logged_torque():
     """Friction without bristles sticks under that noise, as the rig did, which never felt it."""
-    found = found_in(0.02)
+    found = found_in(0.01)
     assert {"coulomb_friction", "presliding_friction"} <= {*found.effects}
     sizes = {name: found.parameters[name].value for name in (
         "jm", "coulomb_friction.motor_nm", "presliding_friction.motor_rad"
