@@ -40,8 +40,7 @@ _MOST = 0.1
 """Of the torque's variance: where it holds more in all octaves, that is what excites the rig."""
 _FEWEST_ERRORS = 60
 """Of a cell, and noise that is more than the position's there: what else shows no noise."""
-_SIMULATED = 4  # simulations of each run with noise of its torque,
-_COMPARED = 1  # and where many fits are only compared
+_SIMULATED = 4  # simulations of each run with noise of its torque
 _SEED = 1
 
 
@@ -100,7 +99,7 @@ def beside_unfelt(fitter: CellFitter, fits: Sequence[CellFit]) -> CellFitter:
         return fitter
     power = np.zeros(fitter.evidence.cells)
     for fit in fits:
-        noise = torque_noise(fitter.evidence, fit.model, _COMPARED)
+        noise = torque_noise(fitter.evidence, fit.model)
         if noise is not None:
             power = np.maximum(power, noise.power)
     return fitter.beside_unfelt(power) if power.any() else fitter
@@ -120,15 +119,12 @@ def driven(evidence: Evidence) -> bool:
     return not steady and not any(evidence.player.loop.laws)
 
 
-def torque_noise(
-    evidence: Evidence, model: Model, simulated: int = _SIMULATED
-) -> TorqueNoise | None:
+def torque_noise(evidence: Evidence, model: Model) -> TorqueNoise | None:
     """Return the noise of the torque that the errors of a model show; None where they show none.
 
     Args:
         evidence: records whose torque drives the model.
         model: the best one.
-        simulated: how often each run is simulated with noise of its torque.
     """
     torques = [record.torque for record in evidence.records.records]
     powers = [float(np.var(torque)) for torque in torques]
@@ -138,7 +134,7 @@ def torque_noise(
     parts = evidence.parts_for("fit", "select")
     cells = evidence.cell_of(parts)
     numbers = np.bincount(cells, minlength=evidence.cells)
-    made = _made(evidence, model, most, simulated)
+    made = _made(evidence, model, most)
     if made is None:
         return None
     known = evidence.floor(parts)
@@ -172,7 +168,7 @@ def most_noise(torque: np.ndarray) -> float:
     return float(np.sqrt(min(found) / 2.0)) if found else 0.0
 
 
-def _made(evidence: Evidence, model: Model, rms: list[float], simulated: int) -> np.ndarray | None:
+def _made(evidence: Evidence, model: Model, rms: list[float]) -> np.ndarray | None:
     """Return the mean square of the errors that noise of each torque makes in each cell, rad2.
 
     None where the motion diverges.
@@ -183,7 +179,7 @@ def _made(evidence: Evidence, model: Model, rms: list[float], simulated: int) ->
     squares: list[np.ndarray] = [np.empty(0)] * len(rms)
     for index, size in enumerate(rms):
         samples = evidence.records.records[index].samples
-        noises = size * random.standard_normal((simulated, samples))
+        noises = size * random.standard_normal((_SIMULATED, samples))
         runs = run_parallel(partial(player.disturbed, model, index, None), list(noises))
         if not all(np.isfinite(run[0]).all() for run in (*runs, smooth[index])):
             return None
