@@ -47,7 +47,6 @@ from .which.late_torque import is_late
 from .which.narrow_band import narrow
 from .which.rounding import beside_rounding
 from .which.torque_timing import Timing, timed
-from .which.unfelt_noise import beside_unfelt
 
 ASSUMED = (
     "How far friction scatters from run to run cannot be seen in these runs; the intervals allow "
@@ -190,8 +189,7 @@ def investigate_runs(
     progress("scatter from run to run")
     bags, scatter, said = _run_scatter(fitter, found.best)
     heard += said
-    comparing = beside_unfelt(fitter, [found.best])
-    found, tested, tied = judged(comparing, found, scatter, names, progress, until)
+    found, tested, tied = judged(fitter, found, scatter, names, progress, until)
     backwards = driven_backwards(evidence)
     lost = reproduced(fitter, found.best) < LEAST_PRESENT
     if backwards or ((tested or not names) and lost):

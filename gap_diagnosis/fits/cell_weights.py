@@ -10,8 +10,6 @@ their mean if n numbers are in them.
 
 from __future__ import annotations
 
-import copy
-
 import numpy as np
 
 from ..model.evidence import Evidence
@@ -31,8 +29,6 @@ class CellWeights:
         select_floor: (parts, bands), least variance of an error there, rad2.
         select_levels: (parts,), index of the level of each.
         unseen: bool (errors that select,) of each run that no fit sees.
-        unfelt: (parts, bands), mean square of an error there that noise of the torque may make,
-            which the rig did not feel, rad2.
     """
 
     def __init__(self, evidence: Evidence) -> None:
@@ -65,7 +61,6 @@ class CellWeights:
             [of_level(evidence.parts[p].level) for p in self.select_parts]
         )
         self.select_floor = self.floor.reshape(-1, evidence.bands)[self.select_levels]
-        self.unfelt = np.zeros(shape)
         unseen = np.setdiff1d(of_part[parts], self.runs)
         self.unseen = [of_part[parts] == run for run in unseen]
 
@@ -107,28 +102,14 @@ class CellWeights:
                 found[k] = 2.0 * own.mean(axis=0) ** 2 / np.maximum(spread, 1e-300)
         return np.maximum(found, LEAST_INDEPENDENT)
 
-    def beside_unfelt(self, power: np.ndarray) -> CellWeights:
-        """Return the same where noise of the torque may make errors, see `unfelt`.
-
-        Args:
-            power: mean square of such an error in each cell, (cells,), rad2.
-        """
-        other = copy.copy(self)
-        other.unfelt = power.reshape(-1, self._evidence.bands)[self.select_levels]
-        return other
-
     def gained(self, after: np.ndarray, before: np.ndarray) -> np.ndarray:
         """Return the log-likelihood gained in each band of each part that selects, nats.
-
-        A model that sticks hides noise of the torque that drives it, one that yields shows it:
-        neither is the better for that.
 
         Args:
             after: (parts, bands), mean squares that one fit leaves there, rad2.
             before: those of the other fit.
         """
-        ratio = (before + self.unfelt) / (after + self.unfelt)
-        return 0.5 * self.compared(after, before) * np.log(ratio)
+        return 0.5 * self.compared(after, before) * np.log(before / after)
 
     def compared(self, after: np.ndarray, before: np.ndarray) -> np.ndarray:
         """Return how many independent numbers tell two fits apart, (parts, bands); see `gained`."""

@@ -6,10 +6,8 @@ unknown.
 
 from __future__ import annotations
 
-import copy
 import math
 from dataclasses import dataclass
-from typing import TypeVar
 
 import numpy as np
 from scipy import stats
@@ -22,7 +20,6 @@ from ..starts.search_space import Space
 from .cell_weights import CellWeights
 from .unseen_friction import beside_scatter, deviated
 
-_Own = TypeVar("_Own", bound="Comparison")
 NOTHING_LEFT = 2.0
 """Mean squared error over noise below which noise explains what is left."""
 CHANCE = 1e-4  # that noise leaves as much in a band: then something else is left there
@@ -68,16 +65,6 @@ class Comparison:
         """Prepare."""
         self.evidence, self.weights = evidence, CellWeights(evidence)
         self.select_parts = self.weights.select_parts
-
-    def beside_unfelt(self: _Own, power: np.ndarray) -> _Own:
-        """Return what compares fits where noise of the torque may make errors.
-
-        Args:
-            power: mean square of such an error in each cell, (cells,), rad2.
-        """
-        other = copy.copy(self)
-        other.weights = self.weights.beside_unfelt(power)
-        return other
 
     def misfit(self, fit: CellFit) -> float:
         """Return what a fit leaves on unseen parts over noise and the simulation's own error.

@@ -8,6 +8,5 @@ rate is seen to act, `narrow_band` how far a motion tells linear laws from each 
 
 What the torque and the encoder are is asked apart: `torque_timing` says first how a recorded torque
 acts between its samples, `late_torque` brings forward one that comes late, `drift_gate` fits a
-drift of friction, `rounding` plays an encoder of coarse steps, and `unfelt_noise` says how much
-noise the torque may hold, beside which explanations are compared.
+drift of friction, and `rounding` plays an encoder of coarse steps.
 """

@@ -32,7 +32,6 @@ class Extension:
 
     Attributes:
         effects: identifiers to try.
-        comparing: compares explanations.
     """
 
     def __init__(self, fitter: CellFitter, effects: Sequence[str], progress: Progress) -> None:
@@ -45,7 +44,6 @@ class Extension:
         """
         self.effects = effects
         self._fitter, self._progress = fitter, progress
-        self.comparing = fitter
         self._first: tuple[CellFit, dict[str, Screening]] | None = None
 
     def extended(
@@ -131,7 +129,7 @@ class Extension:
         """Return the effects that unseen parts cannot tell from the chosen one."""
         first = self.gain(chosen, parent).mean
         others = [f for f in fits if f is not chosen and f.effects[:-1] == chosen.effects[:-1]]
-        return [f.effects[-1] for f in others if stands_for(self.comparing, f, chosen, first)]
+        return [f.effects[-1] for f in others if stands_for(self._fitter, f, chosen, first)]
 
     def chosen(self, fits: Sequence[CellFit], parent: CellFit) -> CellFit | None:
         """Return the best fit whose gain repeats, unless another one gains much more.
@@ -144,7 +142,7 @@ class Extension:
         lacks a law of friction which repeats: where a datasheet lacks all friction, one of two laws
         does most of what both do.
         """
-        gains = [gain(self.comparing, fit, parent, fit.acts) for fit in fits]
+        gains = [gain(self._fitter, fit, parent, fit.acts) for fit in fits]
         present = [fit for fit, found in zip(fits, gains, strict=True) if found.present]
         repeating = [
             fit
@@ -153,9 +151,9 @@ class Extension:
         ]
         if not repeating:
             return None
-        left = [left_of(self.comparing, fit, parent) for fit in present]
+        left = [left_of(self._fitter, fit, parent) for fit in present]
         nearly_all = present[int(np.argmin(left))]
-        if min(left) < NEARLY_ALL and left_of(self.comparing, repeating[0], parent) > MOST:
+        if min(left) < NEARLY_ALL and left_of(self._fitter, repeating[0], parent) > MOST:
             return nearly_all
         first = repeating[0]
         gained = self.gain(first, parent).mean
@@ -163,10 +161,10 @@ class Extension:
             f
             for f in repeating
             if f is first
-            or (stands_for(self.comparing, f, first, gained) and not self._lacks_friction(f, first))
+            or (stands_for(self._fitter, f, first, gained) and not self._lacks_friction(f, first))
         ]
         laws = [fit.effects for fit in alike]
-        worth = [likelihood(self.comparing, fit, parent) for fit in alike]
+        worth = [likelihood(self._fitter, fit, parent) for fit in alike]
         plain = [plainness(fit.effects, fit.space.effects, laws) for fit in alike]
         return alike[min(range(len(alike)), key=lambda k: (*plain[k], -worth[k]))]
 
@@ -179,11 +177,11 @@ class Extension:
 
     def ranked(self, fits: Sequence[CellFit], parent: CellFit) -> list[CellFit]:
         """Return fits by what they gain over their parent, the best first."""
-        return ranked(self.comparing, fits, parent)
+        return ranked(self._fitter, fits, parent)
 
     def gain(self, after: CellFit, before: CellFit) -> Gain:
         """Return what one fit gains over another on unseen parts."""
-        return gain(self.comparing, after, before)
+        return gain(self._fitter, after, before)
 
     def _proposed(
         self, parent: CellFit, screened: Mapping[str, Screening], most: int

@@ -21,7 +21,6 @@ from .exchange import drop_hindering, replace_bounded
 from .extension import Extension
 from .found import Found
 from .friction_left import FRICTION, lacks_friction
-from .unfelt_noise import beside_unfelt
 
 MOST_CAUSES = 5
 _PARENTS = 3  # leading fits beside which a second cause is looked for
@@ -192,17 +191,13 @@ class Stepwise:
         return self.extension.ranked(pairs, steps[0])
 
     def _repeating(self, fits: Sequence[CellFit], found: Found) -> CellFit | None:
-        """Return what is chosen of the fits that close enough, and keep them all.
-
-        They are compared beside the noise that the torque may hold.
-        """
+        """Return what is chosen of the fits that close enough, and keep them all."""
         best = found.best
-        self.extension.comparing = beside_unfelt(self._fitter, [best, *fits])
         found.rivals[len(best.effects) + 1] = [
             *found.rivals.get(len(best.effects) + 1, []), *fits
         ]  # fmt: skip
         closing = [f for f in fits if self._closes(f, best) >= self._least_closed(f, found)]
-        return self.extension.chosen(self.extension.ranked(closing, best), best)
+        return self.extension.chosen(closing, best)
 
     def _closes(self, fit: CellFit, before: CellFit) -> float:
         """Return how much a fit closes of the band in which it gains most, or of all if more.

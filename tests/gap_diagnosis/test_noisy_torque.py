@@ -14,9 +14,8 @@ from hypothesis import strategies as st
 
 from gap_diagnosis.any_record import investigate
 from gap_diagnosis.fits.cell_fits import CellFitter
-from gap_diagnosis.fits.cell_weights import CellWeights
 from gap_diagnosis.model.evidence import Evidence
-from gap_diagnosis.which.unfelt_noise import most_noise, torque_noise
+from gap_diagnosis.verdict.noisy_torque import most_noise, torque_noise
 
 COGGING = {"cogging.amplitude_nm": 6.0, "cogging.cycles_per_turn": 40.0}
 RIGID = {
@@ -64,22 +63,6 @@ def test_noise_that_the_rig_felt_counts_as_none():
     fitter = CellFitter(Evidence(records, NOMINAL), NOMINAL, 0.1)
     assert most_noise(records.records[0].torque) > 1.0
     assert torque_noise(fitter.evidence, fitter.refit().model) is None
-
-
-@pytest.fixture(scope="module")
-def weights():
-    return CellWeights(Evidence(driven_runs(), NOMINAL))
-
-
-@given(st.integers(0, 1000), st.floats(1e-6, 10.0))
-def test_beside_unfelt_noise_explanations_differ_less_and_in_the_same_sense(weights, seed, power):
-    rng = np.random.default_rng(seed)
-    after, before = np.exp(rng.normal(0.0, 2.0, (2, *weights.counts.shape)))
-    alone = weights.gained(after, before)
-    cells = len(weights.floor)
-    beside = weights.beside_unfelt(np.full(cells, power)).gained(after, before)
-    assert (beside * alone >= 0.0).all() and (np.abs(beside) <= np.abs(alone)).all()
-    np.testing.assert_allclose(weights.gained(after, before), alone)  # they are as they were
 
 
 def test_a_torque_that_is_white_itself_is_no_noise():
