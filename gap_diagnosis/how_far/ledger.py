@@ -16,9 +16,6 @@ from ..where.remainder import looks_like
 from .bootstrap import Choice, ratio, stage_figures
 
 _MOST_PLACES = 4
-_SLIGHT = 0.1
-"""Of the usual motion, rms: of a run that moves less, a miss is measured by as much. Friction holds
-such a run within its bristles, where a law that is right to some percent elsewhere may be wrong."""
 
 
 class Ledger:
@@ -32,9 +29,6 @@ class Ledger:
         self._played: list[tuple[Model, np.ndarray, list[np.ndarray]]] = []
         self._part = evidence.part_of(self.parts)
         energy = [self._energy(i) for i in range(len(evidence.records.records))]
-        counted = np.maximum(energy, _SLIGHT**2 * np.mean(energy))
-        self._slight = np.array([energy[evidence.parts[p].record] for p in self.parts])
-        self._slight /= np.array([counted[evidence.parts[p].record] for p in self.parts])
         of_part = np.array([energy[part.record] for part in evidence.parts])
         of_motion = np.concatenate(
             [np.tile(evidence.of_motion, evidence.windows(p)) for p in self.parts]
@@ -69,10 +63,6 @@ class Ledger:
     def squares(self, model: Model) -> np.ndarray:
         """Return the squared error over the squared motion of each part, (parts,)."""
         return self._by_part(self._errors_and_runs(model)[0] ** 2 / self._scale)
-
-    def missed(self, model: Model) -> float:
-        """Return which share of the squared motion a model misses, slight motion counted less."""
-        return float(np.mean(self._slight * self.squares(model)))
 
     def _by_part(self, squares: np.ndarray) -> np.ndarray:
         place = {part: k for k, part in enumerate(self.parts)}

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+
 from fjr_records.driven import goes_backwards
 
 from ..fits.cell_fits import CellFitter
@@ -151,7 +153,7 @@ def reproduced(fitter: CellFitter, fit: CellFit) -> float:
     """
     if fitter.misfit(fit) < PLAIN:
         return 1.0
-    return max(1.0 - Ledger(fitter.evidence).missed(fit.model), 0.0)
+    return max(1.0 - float(np.mean(Ledger(fitter.evidence).squares(fit.model))), 0.0)
 
 
 def driven_backwards(evidence: Evidence) -> bool:
