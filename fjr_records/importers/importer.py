@@ -153,7 +153,8 @@ def _check_controller(known: Sequence[tuple[Record, dict[str, Any]]], source: st
 def _off(record: Record, controller: dict[str, Any]) -> float | None:
     """Return the rms difference of a recorded torque from that of its law, relative to it.
 
-    None where that cannot be said: no reference, no law, gains that are not known.
+    None where that cannot be said: no reference, no law, gains that are not known, or a torque that
+    never changes.
     """
     if "r" not in record.signals or not controller or "unknown" in controller:
         return None
@@ -161,8 +162,10 @@ def _off(record: Record, controller: dict[str, Any]) -> float | None:
     law = law_as_run(controller, record.sample_rate_hz)
     settled = slice(int(_SETTLE * u.size), None)
     scale = float(np.std(u[settled]))
+    if scale == 0.0:
+        return None
     with np.errstate(all="ignore"):
-        off = float(np.std((law.torque(r, y) - u)[settled])) / scale if scale > 0 else 0.0
+        off = float(np.std((law.torque(r, y) - u)[settled])) / scale
     return off if off <= np.inf else np.inf  # what overflows is not a number
 
 

@@ -338,6 +338,9 @@ def test_pushes_in_one_file_of_a_controller_are_told_and_not_refused(tmp_path):
     both = read_files([save(tmp_path, "alone", alone), pushed], options(controllers=(law,)))
     told = [note for note in both.notes if "differs by" in note]
     assert len(told) == 1 and "pushed" in told[0]
+    still = save(tmp_path, "still", {**alone, "u": np.ones(alone["u"].size)})
+    with pytest.raises(InputError, match=r"from that in .*pushed"):  # a constant says nothing of it
+        read_files([still, pushed], options(controllers=(law,)))
 
 
 def test_dry_run_shows_what_is_understood_and_writes_nothing(tmp_path, run):
