@@ -29,7 +29,7 @@ from .. import effects as fx
 from .places import FS, FSM, FV, FVM, JM, K0, K1, LINK_BRISTLES, MOTOR_BRISTLES, J
 from .presliding import with_bristles
 from .spring import deflection, deflection_speed, spring_region
-from .step_size import fastest_rate, pushes, reach, reach_within_energy, slackened
+from .step_size import bends_more, fastest_rate, pushes, reach, reach_within_energy, slackened
 from .stick_slip import (
     advance_smoothly,
     facing,
@@ -143,13 +143,16 @@ def coefficients(values: Mapping[str, Any]) -> tuple[float, ...]:
 @jit
 def _advance(s, torque, w, duration, p, e):
     """Return state and build-up after a duration of constant torque."""
-    link, motor = pushes(s, torque, w, p, e)
-    twist = reach(s, link, motor, duration, p, e)
+    twist, bends = 0.0, bends_more(p, e)
+    if bends:
+        link, motor = pushes(s, torque, w, p, e)
+        twist = reach(s, link, motor, duration, p, e)
     rated = p
     if e is not None and (p[LINK_BRISTLES] != 0.0 or p[MOTOR_BRISTLES] != 0.0):
         rated = slackened(s, torque, w, duration, p, e)
     steps = fastest_rate(twist, s, torque, rated, e) * duration / _PHASE_PER_STEP
-    if steps > _CHEAP_SUBSTEPS:
+    if bends and steps > _CHEAP_SUBSTEPS:
+        link, motor = pushes(s, torque, w, p, e)
         twist = min(twist, reach_within_energy(s, link, motor, duration, p, e))
         steps = fastest_rate(twist, s, torque, rated, e) * duration / _PHASE_PER_STEP
     if not (steps < _MAX_SUBSTEPS and math.isfinite(torque)):

@@ -12,5 +12,5 @@ JM, J, FS, FSM, FV, FVM, K0, K1, LINK_BRISTLES, MOTOR_BRISTLES = range(10)
 
 @inlined
 def is_rigid(p):
-    """Tell whether the link is one that nothing moves, since the axis is rigid."""
+    """Tell whether the link is one that nothing moves: the axis is rigid, or the link is held."""
     return p[J] == math.inf

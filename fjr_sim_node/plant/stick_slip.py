@@ -3,6 +3,9 @@
 An event is a velocity that reaches zero, a torque on a stuck side that reaches the Coulomb level, a
 deflection that turns round or enters another part of the spring. It is located by root finding on
 the Runge-Kutta step in which it falls, and that step ends there. Symbols as in `motion`.
+
+What only an event or a side at rest calls for is compiled apart, so that what every step does stays
+short.
 """
 
 from __future__ import annotations
@@ -22,7 +25,7 @@ from .motion import (
     runge_kutta,
     transmitted,
 )
-from .places import LINK_BRISTLES, MOTOR_BRISTLES
+from .places import LINK_BRISTLES, MOTOR_BRISTLES, is_rigid
 from .spring import (
     deflection,
     deflection_speed,
@@ -49,13 +52,8 @@ def _creep_direction(excess, direction):
     return 1.0 if excess > 0.0 else -1.0
 
 
-@inlined
-def link_direction(s, m, w, p, e):
-    """Return the link's slip direction, 0 if it sticks; a side without friction always slips."""
-    if s[1] > 0.0:
-        return 1.0
-    if s[1] < 0.0:
-        return -1.0
+@jit
+def _link_direction_from_rest(s, m, w, p, e):
     te = transmitted(s, m, w, p, e)
     drive = link_torque(s, te, p, e)
     if e is not None and p[LINK_BRISTLES] != 0.0:
@@ -69,12 +67,19 @@ def link_direction(s, m, w, p, e):
 
 
 @inlined
-def motor_direction(s, torque, m, w, p, e):
-    """Return the motor's slip direction, 0 if it sticks."""
-    if s[3] > 0.0:
+def link_direction(s, m, w, p, e):
+    """Return the link's slip direction, 0 if it sticks; a side without friction always slips."""
+    if is_rigid(p):
+        return 0.0
+    if s[1] > 0.0:
         return 1.0
-    if s[3] < 0.0:
+    if s[1] < 0.0:
         return -1.0
+    return _link_direction_from_rest(s, m, w, p, e)
+
+
+@jit
+def _motor_direction_from_rest(s, torque, m, w, p, e):
     te = transmitted(s, m, w, p, e)
     drive = motor_torque(s, te, torque, p, e)
     if e is not None and p[MOTOR_BRISTLES] != 0.0:
@@ -87,8 +92,24 @@ def motor_direction(s, torque, m, w, p, e):
 
 
 @inlined
+def motor_direction(s, torque, m, w, p, e):
+    """Return the motor's slip direction, 0 if it sticks."""
+    if s[3] > 0.0:
+        return 1.0
+    if s[3] < 0.0:
+        return -1.0
+    return _motor_direction_from_rest(s, torque, m, w, p, e)
+
+
+@inlined
 def _deflection_acceleration(s, d, e):
     return deflection_speed(d[1], s[2], d[3], e) - lever_slope(s[2], e) * s[3] * s[3]
+
+
+@jit
+def _bending(s, torque, m, w, p, e):
+    """Return how fast the speed of the deflection changes (rad/s2)."""
+    return _deflection_acceleration(s, derivative(s, torque, m, w, p, e), e)
 
 
 @inlined
@@ -96,7 +117,7 @@ def flex_direction(s, torque, m, w, p, e):
     """Return the direction in which the deflection changes."""
     speed = deflection_speed(s[1], s[2], s[3], e)
     if speed == 0.0:
-        speed = _deflection_acceleration(s, derivative(s, torque, m, w, p, e), e)
+        speed = _bending(s, torque, m, w, p, e)
     return 1.0 if speed >= 0.0 else -1.0
 
 
@@ -106,6 +127,8 @@ def _link_margin(s, m, w, p, e):
 
     A side without Coulomb friction has no events, its margin is constant.
     """
+    if is_rigid(p):
+        return 1.0
     if e is not None and p[LINK_BRISTLES] != 0.0:
         return s[1] * m[0]
     level = link_level(0.0, p, e)
@@ -251,6 +274,39 @@ def _breaks_away(which, s, torque, m, w, p, e):
 
 
 @jit
+def _after_event(which, s, torque, m, w, p, e):
+    """Return state, directions and memory just after an event."""
+    w = remembered(s, torque, m, w, p, e)
+    link, motor, flex, region = m
+    if which == 0:
+        if link == 0.0:
+            link = _breaks_away(0, s, torque, m, w, p, e)
+        else:
+            s = _stopped(s, True, False)
+            link = link_direction(s, m, w, p, e)
+    elif which == 1:
+        if motor == 0.0:
+            motor = _breaks_away(1, s, torque, m, w, p, e)
+        else:
+            s = _stopped(s, False, True)
+            motor = motor_direction(s, torque, m, w, p, e)
+    elif which == 2:
+        flex = -flex
+    elif e is not None:
+        region = next_region(deflection(s[0], s[2], e), region, e)
+    m = (link, motor, flex, region)
+    return s, m, facing(s, torque, m, w, p, e)
+
+
+@jit
+def _without_reversal(s, torque, m, w, p, e):
+    """Return the state with the sides stopped that have reversed."""
+    link_reversed = _margin(0, s, torque, m, w, p, e) < 0.0
+    motor_reversed = _margin(1, s, torque, m, w, p, e) < 0.0
+    return _stopped(s, link_reversed, motor_reversed)
+
+
+@jit
 def advance_smoothly(s, torque, m, w, h, p, e):
     """Return state, directions and memory after h seconds, through any number of events."""
     for _ in range(_MAX_EVENTS):
@@ -270,28 +326,7 @@ def advance_smoothly(s, torque, m, w, h, p, e):
             return s1, m, w
         s = runge_kutta(s, torque, m, w, time, p, e)
         h -= time
-        w = remembered(s, torque, m, w, p, e)
-        link, motor, flex, region = m
-        if first == 0:
-            if link == 0.0:
-                link = _breaks_away(0, s, torque, m, w, p, e)
-            else:
-                s = _stopped(s, True, False)
-                link = link_direction(s, m, w, p, e)
-        elif first == 1:
-            if motor == 0.0:
-                motor = _breaks_away(1, s, torque, m, w, p, e)
-            else:
-                s = _stopped(s, False, True)
-                motor = motor_direction(s, torque, m, w, p, e)
-        elif first == 2:
-            flex = -flex
-        elif e is not None:
-            region = next_region(deflection(s[0], s[2], e), region, e)
-        m = (link, motor, flex, region)
-        w = facing(s, torque, m, w, p, e)
+        s, m, w = _after_event(first, s, torque, m, w, p, e)
     # Only a torque that grazes the Coulomb level comes here: stop a side that would reverse.
     s = runge_kutta(s, torque, m, w, h, p, e)
-    link_reversed = _margin(0, s, torque, m, w, p, e) < 0.0
-    motor_reversed = _margin(1, s, torque, m, w, p, e) < 0.0
-    return _stopped(s, link_reversed, motor_reversed), m, w
+    return _without_reversal(s, torque, m, w, p, e), m, w

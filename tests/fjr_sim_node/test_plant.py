@@ -271,6 +271,16 @@ def test_what_cannot_be_followed_is_nan_at_once(overrides, torque):
     assert np.isnan(state).all()
 
 
+def test_friction_of_a_link_that_is_held_does_nothing():
+    def end(fs):
+        p, x = plant.coefficients(values(j=math.inf, fs=fs)), (0.0, 0.0, 0.0, 0.0)
+        for torque in np.repeat([60.0, -60.0, 10.0], 100).tolist():
+            x = plant.advance(*x, torque, 1e-3, p)
+        return x
+
+    assert end(5.0) == end(0.0) and end(0.0)[0] == 0.0 and end(0.0)[2] != 0.0
+
+
 def test_nan_never_leaves_the_state_again():
     p = plant.coefficients(PAPER)
     assert np.isnan(plant.advance(math.nan, 0.0, 0.0, 0.0, 1.0, 1e-3, p)).all()
