@@ -27,9 +27,9 @@ _ACTS = 0.1
 """Of what is left in a band of a part: an effect that moves it by less does not act there."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CellFit:
-    """One explanation after fitting.
+    """One explanation after fitting, equal to itself only.
 
     Attributes:
         effects: identifiers in the order in which they were added.

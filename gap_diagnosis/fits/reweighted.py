@@ -46,6 +46,7 @@ class ReweightedFits(Comparison):
         super().__init__(evidence)
         self.nominal, self.tolerance = dict(nominal), tolerance
         self.fit_parts = self.weights.fit_parts
+        self._taken_out: dict[tuple[Evidence, CellFit, str], CellFit] = {}
         self.groups, self.runs = evidence.stretch_of(self.fit_parts), self.weights.runs
         records = evidence.records
         self.scales = Scales.of_record(
@@ -128,7 +129,15 @@ class ReweightedFits(Comparison):
         and where, to first order, all else does what the effect did, if that leaves less: of two
         that look alike each is greater by what the other takes away. A ripple that stays is the one
         that it was: with as few cycles as it takes it would be whatever was taken out.
+
+        Search and tests ask for the same more than once, so what was fitted is kept.
         """
+        key = (self.evidence, fit, effect)
+        if key not in self._taken_out:
+            self._taken_out[key] = self._fitted_without(fit, effect)
+        return self._taken_out[key]
+
+    def _fitted_without(self, fit: CellFit, effect: str) -> CellFit:
         names = tuple(n for n in fit.space.effects if not n.startswith(f"{effect}."))
         units = tuple(
             u for n, u in zip(fit.space.effects, fit.space.units, strict=True) if n in names

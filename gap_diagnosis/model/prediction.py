@@ -16,7 +16,7 @@ does to the torque, it does to the observer's.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.fft import next_fast_len
@@ -175,27 +175,36 @@ def prediction_error(
     return np.fft.irfft(error, samples)
 
 
-def added_for(
-    torque: np.ndarray,
-    nominal: Mapping[str, float],
-    observer: TransferFunction,
-    sample_rate_hz: float,
-) -> np.ndarray:
-    """Return what an observer of a linear model adds for a torque that the model lacks.
+@dataclass(frozen=True)
+class Added:
+    """What an observer of a linear model adds for torques that the model lacks.
 
-    Args:
-        torque: (samples,) from when model and observer begin, N m.
+    Attributes:
         nominal: values of the model by the names of PLANT.
         observer: that holds the model.
         sample_rate_hz: rate of the samples.
-
-    Returns:
-        G L (1 + G L)^-1 torque, (samples,) in N m: the torque itself up to the crossover, late and
-        less above.
     """
-    samples = next_fast_len(2 * torque.size, real=True)
-    _, loop = _at_lines(samples, nominal, observer, sample_rate_hz)
-    return np.fft.irfft(np.fft.rfft(torque, samples) * loop / (1.0 + loop), samples)[: torque.size]
+
+    nominal: Mapping[str, float]
+    observer: TransferFunction
+    sample_rate_hz: float
+    _shares: dict[int, np.ndarray] = field(default_factory=dict)
+
+    def __call__(self, torque: np.ndarray) -> np.ndarray:
+        """Return G L (1 + G L)^-1 torque: itself up to the crossover, late and less above.
+
+        Args:
+            torque: (samples,) from when model and observer begin, N m.
+
+        Returns:
+            float64 (samples,), N m.
+        """
+        samples = next_fast_len(2 * torque.size, real=True)
+        if samples not in self._shares:
+            _, loop = _at_lines(samples, self.nominal, self.observer, self.sample_rate_hz)
+            self._shares[samples] = loop / (1.0 + loop)
+        added = np.fft.irfft(np.fft.rfft(torque, samples) * self._shares[samples], samples)
+        return added[: torque.size]
 
 
 def _at_lines(

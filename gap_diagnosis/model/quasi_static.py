@@ -10,7 +10,7 @@ motion, and where the motion has just turned round nothing is compared (`sliding
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -215,9 +215,9 @@ class QuasiStaticSimulator:
         angles = [(self._records[i].position, self._needed(model, i)) for i in which]
         return [np.array([angle, needed, angle]) for angle, needed in angles]
 
-    def added_for(self, torque: np.ndarray, _: Model) -> np.ndarray:
-        """Return a torque that a model lacks, which is seen as it is."""
-        return torque
+    def added(self, _: Model) -> Callable[[np.ndarray], np.ndarray]:
+        """Return what says how a torque is seen that a model lacks: as it is."""
+        return lambda torque: torque
 
     def _run(self, model: Model, index: int) -> np.ndarray:
         record, needed = self._records[index], self._needed(model, index)

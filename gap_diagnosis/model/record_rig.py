@@ -22,7 +22,7 @@ from fjr_sim_node.simulation.closed_loop import State, Trajectory
 
 from .drive import Drive
 from .near_steady import begins
-from .prediction import CROSSOVER_SHARE, added_for, model_observer, prediction_error, settles
+from .prediction import CROSSOVER_SHARE, Added, model_observer, prediction_error, settles
 from .record_loop import RecordLoop, loop_of, without_erratic, without_swinging
 from .record_start import held_at, start_of
 from .rig_model import Model, too_stiff
@@ -218,9 +218,9 @@ class RecordSimulator:
             return np.full((3, self.records.records[index].samples), np.nan)
         return _signals(model, run)
 
-    def added_for(self, torque: np.ndarray, model: Model) -> np.ndarray:
-        """Return what that observer adds for a torque that a model lacks, (samples,), N m."""
-        return added_for(torque, model.whole_plant, self._observer, self._rate)
+    def added(self, model: Model) -> Added:
+        """Return what says which torque that observer adds for one that a model lacks."""
+        return Added(model.whole_plant, self._observer, self._rate)
 
     def drive(self, index: int) -> Drive:
         """Return what drives a simulation of one run."""

@@ -55,7 +55,7 @@ class SeenTorques:
         self._crossover_hz = simulator.crossover_hz
         every = max(int(rate / (_PER_CROSSOVER * simulator.crossover_hz)), 1)
         runs = sorted({evidence.parts[p].record for p in parts})
-        self._simulator, self._every = simulator, every
+        self._added, self._every = simulator.added(model), every
         self._swings_free = evidence.records.swings_free
         self._ends = np.cumsum([records[index].samples for index in runs])[:-1]
         self._angles = [records[index].position for index in runs]
@@ -96,10 +96,7 @@ class SeenTorques:
         """
         pieces = zip(np.split(torque, self._ends), self._places, strict=True)
         return np.concatenate(
-            [
-                _averaged(self._simulator.added_for(piece, self._model), self._every)[rows]
-                for piece, rows in pieces
-            ]
+            [_averaged(self._added(piece), self._every)[rows] for piece, rows in pieces]
         )
 
     def load(self, effect: str) -> list[dict[str, float]]:

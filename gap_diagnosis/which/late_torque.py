@@ -104,10 +104,11 @@ def _lateness(evidence: Evidence, fit: CellFit) -> float:
     runs = sorted({evidence.parts[p].record for p in evidence.parts_for("fit", "select")})
     missing = player.missing_torque(fit.model, runs)
     product = square = 0.0
+    added = player.added(fit.model)
     for lacks, index in zip(missing, runs, strict=True):
         torque = evidence.records.records[index].torque
         rate = np.gradient(torque) * evidence.records.sample_rate_hz
-        seen = player.added_for(rate, fit.model)
+        seen = added(rate)
         product += float(lacks @ seen)
         square += float(seen @ seen)
     return product / square if square > 0.0 else 0.0

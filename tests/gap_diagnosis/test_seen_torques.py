@@ -112,7 +112,7 @@ def test_what_an_observer_adds_for_a_torque_is_known(lasts_s):
         evidence.lines * evidence.line_hz, NOMINAL,
     )  # fmt: skip
     added = simulator.missing_torque(model, [0])[0] - other.missing_torque(model, [0])[0]
-    expected = simulator.added_for(torque, model)
+    expected = simulator.added(model)(torque)
     late = slice(int(0.5 * evidence.records.sample_rate_hz), None)
     assert np.std(added[late] - expected[late]) < 0.02 * np.std(expected[late])
     assert (np.std(expected[late]) > 0.9 * 3.0) == (lasts_s > 1.0)
