@@ -159,24 +159,24 @@ def fastest_rate(twist, s, torque, p, e):
     stiffness = p[K0] + hardened
     if hardened > p[K0]:
         stiffness += hardened - p[K0]
-    light, quick = 1.0 / p[J], 1.0 / p[JM]
-    decay = p[FV] * light + p[FVM] * quick
+    link_mobility, motor_mobility = 1.0 / p[J], 1.0 / p[JM]
+    decay = p[FV] * link_mobility + p[FVM] * motor_mobility
     if e is None:
-        return math.sqrt(stiffness * (light + quick)) + decay
-    return _fastest_rate(stiffness, twist, decay, light, quick, s, torque, p, e)
+        return math.sqrt(stiffness * (link_mobility + motor_mobility)) + decay
+    return _fastest_rate(stiffness, twist, decay, link_mobility, motor_mobility, s, torque, p, e)
 
 
 @jit
-def _fastest_rate(stiffness, twist, decay, light, quick, s, torque, p, e):
+def _fastest_rate(stiffness, twist, decay, link_mobility, motor_mobility, s, torque, p, e):
     link, motor = p[LINK_BRISTLES], p[MOTOR_BRISTLES]
-    mobility = light + quick
+    mobility = link_mobility + motor_mobility
     if e[fx.TRANSMISSION_ON] != 0.0:
         stiffness += p[K0] * abs(e[fx.ASYMMETRIC_STIFFNESS_RELATIVE])
         ratio, bend = _kinematic_bounds(e)
         motor += stiffness * twist * bend
         if e[fx.HYSTERESIS_TORQUE_NM] != 0.0:
             stiffness += e[fx.HYSTERESIS_TORQUE_NM] / e[fx.HYSTERESIS_DISPLACEMENT_RAD]
-        mobility = light + ratio * (ratio + load_coefficient(e)) * quick
+        mobility = link_mobility + ratio * (ratio + load_coefficient(e)) * motor_mobility
         decay += e[fx.TRANSMISSION_DAMPING_NM_S_RAD] * mobility
         outside = e[fx.GRAVITY_TORQUE_NM] + e[fx.EXTERNAL_SPRING_STIFFNESS_NM_RAD]
         outside += e[fx.CABLE_STIFFNESS_NM_RAD]
@@ -185,16 +185,16 @@ def _fastest_rate(stiffness, twist, decay, light, quick, s, torque, p, e):
         else:
             link += outside
     elif e[fx.FRICTION_ON] != 0.0:
-        mobility += load_coefficient(e) * quick
+        mobility += load_coefficient(e) * motor_mobility
     if e[fx.FRICTION_ON] != 0.0:
         friction = e[fx.POSITION_FRICTION_AMPLITUDE_NM] * e[fx.POSITION_FRICTION_CYCLES_PER_TURN]
         motor += friction * (1.0 + 2.0 * e[fx.POSITION_FRICTION_SECOND_RATIO])
-        decay += _decay_by_friction(s, light, quick, p, e)
+        decay += _decay_by_friction(s, link_mobility, motor_mobility, p, e)
     if e[fx.DRIVE_ON] != 0.0:
         cogging = e[fx.COGGING_AMPLITUDE_NM] * e[fx.COGGING_CYCLES_PER_TURN]
         motor += cogging * (1.0 + 2.0 * e[fx.COGGING_SECOND_RATIO])
-        decay += _decay_at_limit(s, torque, e) * quick
-    rate = math.sqrt(stiffness * mobility + link * light + motor * quick) + decay
+        decay += _decay_at_limit(s, torque, e) * motor_mobility
+    rate = math.sqrt(stiffness * mobility + link * link_mobility + motor * motor_mobility) + decay
     rate = max(rate, 0.3 * ripple_rate(s[3], e))
     if e[fx.EXTRA_MODE_INERTIA_KG_M2] != 0.0:
         share = 1.0 + e[fx.EXTRA_MODE_INERTIA_KG_M2] / p[J]
@@ -216,7 +216,7 @@ def _kinematic_bounds(e):
 
 
 @inlined
-def _decay_by_friction(s, light, quick, p, e):
+def _decay_by_friction(s, link_mobility, motor_mobility, p, e):
     """Return how fast friction that falls or grows with speed may damp or drive a side (1/s)."""
     link = 2.0 * e[fx.QUADRATIC_FRICTION_LINK_NM_S2_RAD2] * abs(s[1])
     link += e[fx.STRIBECK_FRICTION_LINK_TORQUE_NM] / e[fx.STRIBECK_FRICTION_LINK_VELOCITY_RAD_S]
@@ -228,7 +228,7 @@ def _decay_by_friction(s, light, quick, p, e):
         # sigma1 exp(-u^2) (1 - F / L) v: |1 - F / L| <= 2, and L falls as fast as sigma1 does
         share = p[MOTOR_BRISTLES] / e[fx.LUGRE_FRICTION_BRISTLE_NM_RAD]  # see `slackened`
         motor += 3.0 * share * e[fx.LUGRE_FRICTION_DAMPING_NM_S_RAD]
-    return link * light + motor * quick
+    return link * link_mobility + motor * motor_mobility
 
 
 @inlined

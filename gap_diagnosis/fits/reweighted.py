@@ -27,6 +27,7 @@ from .comparison import NOTHING_LEFT, CellFit, Comparison
 _REFIT_ROUNDS = (8, 5, 5)
 _FURTHER = 4  # times that a fit is taken further at the most
 _STILL_FALLS = 0.8  # of its misfit
+_KEPT = 16  # fits without a cause, each of which holds a Jacobian
 
 
 class ReweightedFits(Comparison):
@@ -130,11 +131,13 @@ class ReweightedFits(Comparison):
         that look alike each is greater by what the other takes away. A ripple that stays is the one
         that it was: with as few cycles as it takes it would be whatever was taken out.
 
-        Search and tests ask for the same more than once, so what was fitted is kept.
+        Search and tests ask for the same more than once, so the latest of these fits are kept.
         """
         key = (self.evidence, fit, effect)
         if key not in self._taken_out:
             self._taken_out[key] = self._fitted_without(fit, effect)
+            for oldest in list(self._taken_out)[:-_KEPT]:
+                del self._taken_out[oldest]
         return self._taken_out[key]
 
     def _fitted_without(self, fit: CellFit, effect: str) -> CellFit:

@@ -188,7 +188,7 @@ class Added:
     nominal: Mapping[str, float]
     observer: TransferFunction
     sample_rate_hz: float
-    _shares: dict[int, np.ndarray] = field(default_factory=dict)
+    _shares: dict[int, np.ndarray] = field(default_factory=dict, init=False, repr=False)
 
     def __call__(self, torque: np.ndarray) -> np.ndarray:
         """Return G L (1 + G L)^-1 torque: itself up to the crossover, late and less above.

@@ -111,6 +111,7 @@ def test_a_constant_torque_leaves_its_work_to_the_friction_that_is_the_same(spin
     begun = _instead(split, "torque_bias")[own] * split.space.units[0]
     assert begun == pytest.approx(FRICTIONS[0], rel=0.1)
     fewer = fitter.without(split, "torque_bias")
+    assert fitter.without(split, "torque_bias") is fewer  # made once
     assert fitter.misfit(fewer) < 1.05 * fitter.misfit(split)
     for name, size in zip(SIZES[:-1], FRICTIONS, strict=True):
         assert fewer.model.effects[name] == pytest.approx(size, rel=0.1), name
