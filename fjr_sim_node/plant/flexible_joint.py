@@ -143,7 +143,7 @@ def coefficients(values: Mapping[str, Any]) -> tuple[float, ...]:
 @jit
 def _advance(s, torque, w, duration, p, e):
     """Return state and build-up after a duration of constant torque."""
-    twist, bends = 0.0, bends_more(p, e)
+    twist, link, motor, bends = 0.0, 0.0, 0.0, bends_more(p, e)
     if bends:
         link, motor = pushes(s, torque, w, p, e)
         twist = reach(s, link, motor, duration, p, e)
@@ -152,7 +152,6 @@ def _advance(s, torque, w, duration, p, e):
         rated = slackened(s, torque, w, duration, p, e)
     steps = fastest_rate(twist, s, torque, rated, e) * duration / _PHASE_PER_STEP
     if bends and steps > _CHEAP_SUBSTEPS:
-        link, motor = pushes(s, torque, w, p, e)
         twist = min(twist, reach_within_energy(s, link, motor, duration, p, e))
         steps = fastest_rate(twist, s, torque, rated, e) * duration / _PHASE_PER_STEP
     if not (steps < _MAX_SUBSTEPS and math.isfinite(torque)):
