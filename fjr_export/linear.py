@@ -147,6 +147,8 @@ def _continuous(joint: Joint, gains: dict[str, float]) -> tuple[np.ndarray, np.n
     at = 0 if joint.one_body else 1
     stiff[at, at] += weight["torque_nm"] * math.cos(weight["angle_rad"])
     stiff[at, at] += joint.of("external_spring")["stiffness_nm_rad"] + cable["stiffness_nm_rad"]
+    hard = joint.of("hardening_spring")
+    stiff[at, at] += hard["stiffness_nm_rad"] + 3.0 * hard["cubic_nm_rad3"] * hard["rest_rad"] ** 2
     a, b, c = np.zeros((size, size)), np.zeros((size, 1)), np.zeros((2, size))
     inverse = np.diag(1.0 / np.array(inertias))
     a[0 : 2 * bodies : 2, 1 : 2 * bodies : 2] = np.eye(bodies)

@@ -136,6 +136,13 @@ class _Builder:
             spring = self.joint.of("external_spring")
             moving.set("stiffness", _text(spring["stiffness_nm_rad"]))
             moving.set("springref", _text(spring["rest_rad"]))
+        if name == held and self.joint.has("hardening_spring"):
+            if self.joint.has("external_spring"):
+                raise self._beside("hardening_spring", "external_spring")
+            spring = self.joint.of("hardening_spring")
+            stiffness = _text(spring["stiffness_nm_rad"], 0.0, spring["cubic_nm_rad3"])
+            moving.set("stiffness", stiffness)
+            moving.set("springref", _text(spring["rest_rad"]))
         size, colour = ("0.05 0.02", "0.3 0.4 0.6 1") if armature else ("0.02 0.1", "0.7 0.5 0.2 1")
         ET.SubElement(
             body, "geom", type="cylinder", size=size, rgba=colour, mass="0",

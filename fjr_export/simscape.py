@@ -201,6 +201,11 @@ def _outside(joint: Joint, angle: str, made: Laws) -> str:
     if joint.has("external_spring"):
         spring = joint.of("external_spring")
         torque += f" - {spring['stiffness_nm_rad']!r}*({angle} - {spring['rest_rad']!r})"
+    if joint.has("hardening_spring"):
+        spring = joint.of("hardening_spring")
+        stretched = f"({angle} - {spring['rest_rad']!r})"
+        torque += f" - {spring['stiffness_nm_rad']!r}*{stretched}"
+        torque += f" - {spring['cubic_nm_rad3']!r}*{stretched}^3"
     if joint.has("cable"):
         cable = joint.of("cable")
         torque += f" - {cable['stiffness_nm_rad']!r}*({angle} - slack)"

@@ -84,6 +84,7 @@ MJCF: Mapping[str, Treatment] = {
     "extra_mode": _native("a third body behind a tendon"),
     "gravity": _native("a torque that is sinusoidal in the angle of the link"),
     "external_spring": _native("stiffness and springref of the link's joint"),
+    "hardening_spring": _native("stiffness of the link's joint, its first and third coefficient"),
     "cable": _refused("springs there do not give way with time"),
     "transmission_stiffness": _native("a tendon between two bodies"),
     "torque_bias": _native("a constant torque"),
@@ -126,8 +127,9 @@ URDF: Mapping[str, Treatment] = {
     "nonstationary": _refused("parameters there do not change with time"),
     "extra_mode": _refused("the joint moves one body"),
     "gravity": _refused("the mass and its place are not known, only their product"),
-    "external_spring": _refused("a joint there has no spring"),
-    "cable": _refused("a joint there has no spring"),
+    **dict.fromkeys(
+        ("external_spring", "hardening_spring", "cable"), _refused("a joint there has no spring")
+    ),
     **dict.fromkeys(
         (
             *("torque_bias", "cogging", "delay", "actuator_lag", "torque_speed_limit"),
@@ -157,6 +159,7 @@ CONTROL: Mapping[str, Treatment] = {
     "torque_gain": _native("gain of the input"),
     "gravity": _equivalent("its slope at angle zero"),
     "external_spring": _equivalent("its stiffness; what it pulls at angle zero is left out"),
+    "hardening_spring": _equivalent("its slope at angle zero"),
     "cable": _native("a state"),
     "nonstationary": _refused("the model does not change with time"),
     **dict.fromkeys(
@@ -185,9 +188,9 @@ SIMSCAPE: Mapping[str, Treatment] = {
             *("viscous_friction", "quadratic_friction", "presliding_friction", "backlash"),
             *("piecewise_stiffness", "asymmetric_stiffness", "cubic_stiffness", "hysteresis"),
             *("transmission_damping", "kinematic_error", "extra_mode", "gravity"),
-            *("external_spring", "cable", "transmission_stiffness", "torque_bias", "cogging"),
-            *("actuator_lag", "torque_speed_limit", "dead_band", "torque_constant_ripple"),
-            *("torque_gain", "encoder_eccentricity"),
+            *("external_spring", "hardening_spring", "cable", "transmission_stiffness"),
+            *("torque_bias", "cogging", "actuator_lag", "torque_speed_limit", "dead_band"),
+            *("torque_constant_ripple", "torque_gain", "encoder_eccentricity"),
         ),
         _native("its equation"),
     ),

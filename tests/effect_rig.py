@@ -60,6 +60,7 @@ MODERATE = {
     "extra_mode": {"inertia_kg_m2": 0.03, "frequency_hz": 30.0, "damping_ratio": 0.02},
     "gravity": {"torque_nm": 3.0, "angle_rad": 0.5},
     "external_spring": {"stiffness_nm_rad": 40.0, "rest_rad": 0.05},
+    "hardening_spring": {"cubic_nm_rad3": 3e4, "stiffness_nm_rad": 20.0, "rest_rad": 0.02},
     "cable": {"stiffness_nm_rad": 40.0, "relaxation_s": 0.2},
     "transmission_stiffness": {
         "compliance_rad_nm": 1e-3,
@@ -176,6 +177,12 @@ class Rig:
             + 0.5
             * get("external_spring.stiffness_nm_rad")
             * (q - get("external_spring.rest_rad")) ** 2
+            + 0.5
+            * get("hardening_spring.stiffness_nm_rad")
+            * (q - get("hardening_spring.rest_rad")) ** 2
+            + 0.25
+            * get("hardening_spring.cubic_nm_rad3")
+            * (q - get("hardening_spring.rest_rad")) ** 4
             + 0.5 * get("cable.stiffness_nm_rad") * (q - slack) ** 2
             + ripple / cycles * math.cos(angle)
             + ripple

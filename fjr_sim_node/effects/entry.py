@@ -199,6 +199,11 @@ class Effect:
         return self.looks_like == CONSTANT_TORQUE
 
     @property
+    def of_the_angle(self) -> bool:
+        """Whether it is a torque on the joint that depends on the angle, and on nothing else."""
+        return self.load is not None and len(self.load.torques(np.zeros(1))) > 1
+
+    @property
     def depends_on_others(self) -> bool:
         """Whether what the effect changes depends much on the other causes beside it.
 

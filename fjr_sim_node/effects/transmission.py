@@ -39,6 +39,19 @@ def _spring(sizes: Sequence[float]) -> dict[str, float] | None:
     return {"stiffness_nm_rad": stiffness, "rest_rad": torque / stiffness}
 
 
+def _hardening(sizes: Sequence[float]) -> dict[str, float] | None:
+    """Return the parameters of a spring that hardens; None if it softens.
+
+    The sizes are those of -q^3, q^2 and -q; what is left over is a constant torque.
+    """
+    cubic, square, linear, _ = sizes
+    if not cubic > 0.0:
+        return None
+    rest = square / (3.0 * cubic)
+    stiffness = max(linear - 3.0 * cubic * rest**2, 0.0)
+    return {"cubic_nm_rad3": cubic, "stiffness_nm_rad": stiffness, "rest_rad": rest}
+
+
 TRANSMISSION: tuple[Effect, ...] = (
     Effect(
         "backlash",
@@ -189,6 +202,31 @@ TRANSMISSION: tuple[Effect, ...] = (
         ),
         looks_like=CONSTANT_TORQUE,
         load=Load(lambda q: [-q, np.ones(q.size)], _spring),
+        rarer_than="gravity",
+        axis="both",
+    ),
+    Effect(
+        "hardening_spring",
+        "A spring to the frame hardens as the link goes away from where it rests.",
+        "link",
+        "plant.torques:hardening_pull",
+        Telltale("odd distortion and a stiffness that grow with the amplitude", "position"),
+        "Duffing 1918; linear and cubic torsion spring to the ground",
+        (
+            size("cubic_nm_rad3", "N m/rad3", "Cubic stiffness between link and frame", 0.0, 1e15),
+            size("stiffness_nm_rad", "N m/rad", "Stiffness between link and frame where the spring "
+                 "rests", 0.0, 1e9),
+            EffectParameter("rest_rad", 0.0, "rad", "Angle of the link at which it pulls nowhere",
+                            -1e4, 1e4, fit=(-5.0, 5.0)),
+        ),
+        (
+            {"cubic_nm_rad3": (0.01, 0.1), "stiffness_nm_rad": (0.0, 0.03), "rest_rad": (0.0,)},
+            {"cubic_nm_rad3": (0.01,), "stiffness_nm_rad": (0.0,), "rest_rad": (-1.5, 1.5)},
+        ),
+        looks_like=CONSTANT_TORQUE,
+        contains=("external_spring",),
+        on_request=True,
+        load=Load(lambda q: [-(q**3), q**2, -q, np.ones(q.size)], _hardening),
         rarer_than="gravity",
         axis="both",
     ),

@@ -150,10 +150,10 @@ def _advance(s, torque, w, duration, p, e):
     rated = p
     if e is not None and (p[LINK_BRISTLES] != 0.0 or p[MOTOR_BRISTLES] != 0.0):
         rated = slackened(s, torque, w, duration, p, e)
-    steps = fastest_rate(twist, s, torque, rated, e) * duration / _PHASE_PER_STEP
+    steps = fastest_rate(twist, s, torque, duration, rated, e) * duration / _PHASE_PER_STEP
     if bends and steps > _CHEAP_SUBSTEPS:
         twist = min(twist, reach_within_energy(s, link, motor, duration, p, e))
-        steps = fastest_rate(twist, s, torque, rated, e) * duration / _PHASE_PER_STEP
+        steps = fastest_rate(twist, s, torque, duration, rated, e) * duration / _PHASE_PER_STEP
     if not (steps < _MAX_SUBSTEPS and math.isfinite(torque)):
         nan = math.nan
         return (nan, nan, nan, nan, nan, nan, nan, nan), w
@@ -175,13 +175,14 @@ def _advance(s, torque, w, duration, p, e):
 
 @jit
 def _rate(speed, torque, p):
-    return fastest_rate(0.0, (0.0, 0.0, 0.0, speed, 0.0, 0.0, 0.0, 0.0), torque, p, None)
+    s = (0.0, 0.0, 0.0, speed, 0.0, 0.0, 0.0, 0.0)
+    return fastest_rate(0.0, s, torque, 0.0, p, None)
 
 
 @jit
 def _rate_with_effects(speed, torque, p, e):
     s = (0.0, 0.0, 0.0, speed, 0.0, 0.0, 0.0, 0.0)
-    return fastest_rate(0.0, s, torque, with_bristles(p, 1.0, e), e)
+    return fastest_rate(0.0, s, torque, 0.0, with_bristles(p, 1.0, e), e)
 
 
 def steps_per_second(

@@ -15,6 +15,7 @@ from .places import FS, FV, FVM, JM, K0, K1, LINK_BRISTLES, MOTOR_BRISTLES, J, i
 from .spring import deflection, deflection_speed, transmitted_torque
 from .torques import (
     cable_pull,
+    hardening_pull,
     link_level,
     link_viscous,
     load_coefficient,
@@ -41,10 +42,10 @@ def pushes(s, torque, w, p, e):
     stiffness, rest = e[fx.EXTERNAL_SPRING_STIFFNESS_NM_RAD], e[fx.EXTERNAL_SPRING_REST_RAD]
     if is_rigid(p):
         motor += e[fx.GRAVITY_TORQUE_NM] + stiffness * abs(s[2] - rest)
-        motor += abs(cable_pull(s[2], s[7], e))
+        motor += abs(cable_pull(s[2], s[7], e)) + abs(hardening_pull(s[2], e))
     else:
         link += e[fx.GRAVITY_TORQUE_NM] + stiffness * abs(s[0] - rest)
-        link += abs(cable_pull(s[0], s[7], e))
+        link += abs(cable_pull(s[0], s[7], e)) + abs(hardening_pull(s[0], e))
     if p[LINK_BRISTLES] != 0.0:
         link += max(abs(w[0]), p[FS] + e[fx.STRIBECK_FRICTION_LINK_TORQUE_NM])
     if e[fx.EXTRA_MODE_INERTIA_KG_M2] != 0.0:
@@ -148,8 +149,8 @@ def slackened(s, torque, w, duration, p, e):
 
 
 @inlined
-def fastest_rate(twist, s, torque, p, e):
-    """Return in rad/s how fast the motion may oscillate or decay up to a deflection.
+def fastest_rate(twist, s, torque, duration, p, e):
+    """Return in rad/s how fast the motion may oscillate or decay in a hold, up to a deflection.
 
     The squared frequency is bounded by the sum over all springs of stiffness times mobility. A
     spring whose cubic part outweighs the linear one is counted up to twice, since its stiffness
@@ -163,11 +164,13 @@ def fastest_rate(twist, s, torque, p, e):
     decay = p[FV] * link_mobility + p[FVM] * motor_mobility
     if e is None:
         return math.sqrt(stiffness * (link_mobility + motor_mobility)) + decay
-    return _fastest_rate(stiffness, twist, decay, link_mobility, motor_mobility, s, torque, p, e)
+    mobilities = link_mobility, motor_mobility
+    return _fastest_rate(stiffness, twist, decay, mobilities, s, torque, duration, p, e)
 
 
 @jit
-def _fastest_rate(stiffness, twist, decay, link_mobility, motor_mobility, s, torque, p, e):
+def _fastest_rate(stiffness, twist, decay, mobilities, s, torque, duration, p, e):
+    link_mobility, motor_mobility = mobilities
     link, motor = p[LINK_BRISTLES], p[MOTOR_BRISTLES]
     mobility = link_mobility + motor_mobility
     if e[fx.TRANSMISSION_ON] != 0.0:
@@ -179,7 +182,7 @@ def _fastest_rate(stiffness, twist, decay, link_mobility, motor_mobility, s, tor
         mobility = link_mobility + ratio * (ratio + load_coefficient(e)) * motor_mobility
         decay += e[fx.TRANSMISSION_DAMPING_NM_S_RAD] * mobility
         outside = e[fx.GRAVITY_TORQUE_NM] + e[fx.EXTERNAL_SPRING_STIFFNESS_NM_RAD]
-        outside += e[fx.CABLE_STIFFNESS_NM_RAD]
+        outside += e[fx.CABLE_STIFFNESS_NM_RAD] + _hardened(s, torque, duration, p, e)
         if is_rigid(p):
             motor += outside
         else:
@@ -205,6 +208,23 @@ def _fastest_rate(stiffness, twist, decay, link_mobility, motor_mobility, s, tor
     if e[fx.ACTUATOR_LAG_TIME_CONSTANT_S] != 0.0:
         rate = max(rate, 0.2 / e[fx.ACTUATOR_LAG_TIME_CONSTANT_S])
     return rate
+
+
+@inlined
+def _hardened(s, torque, duration, p, e):
+    """Return the greatest stiffness (N m/rad) of a hardening spring where a hold may carry it."""
+    cubic = e[fx.HARDENING_SPRING_CUBIC_NM_RAD3]
+    if cubic == 0.0:
+        return e[fx.HARDENING_SPRING_STIFFNESS_NM_RAD]
+    if is_rigid(p):
+        angle, speed, mass, drive = s[2], s[3], p[JM], abs(torque)
+    else:
+        angle, speed, mass = s[0], s[1], p[J]
+        drive = abs(transmitted_torque(s[0], s[1], s[2], s[3], 0.0, p, e))
+    far = abs(angle - e[fx.HARDENING_SPRING_REST_RAD])
+    drive += abs(hardening_pull(angle, e))
+    far += duration * (abs(speed) + 0.5 * duration * drive / mass)
+    return e[fx.HARDENING_SPRING_STIFFNESS_NM_RAD] + 3.0 * cubic * far * far
 
 
 @inlined

@@ -95,8 +95,16 @@ def cable_pull(angle, slack, e):
 
 
 @inlined
+def hardening_pull(angle, e):
+    """Return the torque (N m) of a spring that hardens on its body at an angle."""
+    stretched = angle - e[fx.HARDENING_SPRING_REST_RAD]
+    cubic = e[fx.HARDENING_SPRING_CUBIC_NM_RAD3] * stretched * stretched
+    return -(e[fx.HARDENING_SPRING_STIFFNESS_NM_RAD] + cubic) * stretched
+
+
+@inlined
 def outside(angle, slack, e):
-    """Return the torque (N m) of gravity, a spring and a cable on the body that they act on."""
+    """Return the torque (N m) of gravity, springs and a cable on the body that they act on."""
     torque = 0.0
     if e[fx.GRAVITY_TORQUE_NM] != 0.0:
         torque -= e[fx.GRAVITY_TORQUE_NM] * math.sin(angle + e[fx.GRAVITY_ANGLE_RAD])
@@ -104,7 +112,7 @@ def outside(angle, slack, e):
         torque -= e[fx.EXTERNAL_SPRING_STIFFNESS_NM_RAD] * (angle - e[fx.EXTERNAL_SPRING_REST_RAD])
     if e[fx.CABLE_STIFFNESS_NM_RAD] != 0.0:
         torque += cable_pull(angle, slack, e)
-    return torque
+    return torque + hardening_pull(angle, e)
 
 
 @inlined

@@ -141,6 +141,16 @@ def _spring(rng: np.random.Generator, at: Scales) -> Draw:
                   {"spring_nm_rad": "stiffness_nm_rad", "spring_rest_rad": "rest_rad"})  # fmt: skip
 
 
+def _hardening(rng: np.random.Generator, at: Scales) -> Draw:
+    scaled = {"spring_nm_rad3": at.torque / at.angle**3}
+    if rng.random() < 0.5:
+        scaled["spring_nm_rad"] = at.torque / at.angle * float(rng.uniform(0.5, 2.0))
+    return linear("hardening_spring", scaled, 0.02, 0.5,
+                  {"spring_rest_rad": at.angle * float(rng.uniform(-0.5, 0.5))},
+                  {"spring_nm_rad3": "cubic_nm_rad3", "spring_nm_rad": "stiffness_nm_rad",
+                   "spring_rest_rad": "rest_rad"})  # fmt: skip
+
+
 def _cable(rng: np.random.Generator, at: Scales) -> Draw:
     return linear("cable", {"cable_nm_rad": at.torque / at.angle}, 0.05, 0.5,
                   {"cable_time_s": log_uniform(rng, 0.05, 2.0)},
@@ -230,6 +240,7 @@ _ANY_AXIS: tuple[Drawer, ...] = (
     _drag,
     _gravity,
     _spring,
+    _hardening,
     _cable,
     _ripple("cogging", "cogging", "nm", 0.03, 0.5, lambda at: at.torque),
     _delay,
@@ -273,7 +284,8 @@ def drawers(*, rigid: bool, stationary: bool) -> tuple[Drawer, ...]:
 FAMILIES: tuple[frozenset[str], ...] = tuple(
     frozenset(names)
     for names in (
-        ("asymmetric_friction", "torque_bias", "gravity", "external_spring", "cable"),
+        ("asymmetric_friction", "torque_bias", "gravity", "external_spring", "hardening_spring",
+         "cable"),
         ("backlash", "piecewise_stiffness", "asymmetric_stiffness", "cubic_stiffness"),
         ("delay", "actuator_lag", "torque_slew_limit"),
         ("position_friction", "cogging", "torque_constant_ripple", "kinematic_error"),

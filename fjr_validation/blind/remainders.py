@@ -11,7 +11,7 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.signal import lfilter
 
-from .draw import Draw, Drawer, Scales, linear
+from .draw import Draw, Drawer, Scales, linear, phase
 from .rigs import log_uniform
 
 SCATTER = (0.01, 0.05)
@@ -29,8 +29,9 @@ def _eddy(rng: np.random.Generator, at: Scales) -> Draw:
     return linear("eddy_drag", {"eddy_nm": at.torque}, 0.05, 0.5, shape)
 
 
-def _air_spring(_: np.random.Generator, at: Scales) -> Draw:
-    return linear("air_spring", {"air_spring_nm_rad3": at.torque / at.angle**3}, 0.02, 0.5)
+def _crank(rng: np.random.Generator, at: Scales) -> Draw:
+    shape = {"crank_cycles": log_uniform(rng, 0.3, 2.0) / at.angle, "crank_phase_rad": phase(rng)}
+    return linear("crank_inertia", {"crank_relative": 1.0}, 0.02, 0.5, shape)
 
 
 def _cushion(rng: np.random.Generator, at: Scales) -> Draw:
@@ -62,7 +63,7 @@ def _jitter(_: np.random.Generator, at: Scales) -> Draw:
 
 
 _ANY_AXIS: tuple[Drawer, ...] = (
-    _eyring, _eddy, _air_spring, _cushion, _heating, _interpolation, _wander, _jitter,
+    _eyring, _eddy, _crank, _cushion, _heating, _interpolation, _wander, _jitter,
 )  # fmt: skip
 
 

@@ -20,7 +20,7 @@ an effect, this is the other one:
     drift                   exponential warm-up
 
 The remainder of the open worlds has laws of its own, in no catalogue: Eyring (shear-thinning)
-drag, eddy-current drag, an air spring to the ground that hardens with the cube, a one-sided
+drag, eddy-current drag, an inertia that varies with the angle as that of a crank, a one-sided
 cushion, a torque constant that falls as the winding heats, loss in bending that grows with its
 square, interpolation error of the encoder, a torque that wanders, jitter of the encoder's stamp.
 """
@@ -49,9 +49,9 @@ SETTINGS: tuple[str, ...] = (
     "slew_nm_s", "deadband_nm", "stiffness_asymmetry",
     "ripple_relative", "ripple_cycles", "ripple_phase_rad",
     "loss_forward", "loss_backward", "stall_nm", "no_load_rad_s",
-    "spring_nm_rad", "spring_rest_rad", "cable_nm_rad", "cable_time_s",
+    "spring_nm_rad", "spring_rest_rad", "spring_nm_rad3", "cable_nm_rad", "cable_time_s",
     "eyring_nm", "eyring_rad_s", "eddy_nm", "eddy_rad_s",
-    "air_spring_nm_rad3", "cushion_nm_rad2", "cushion_rad",
+    "crank_relative", "crank_cycles", "crank_phase_rad", "cushion_nm_rad2", "cushion_rad",
     "heating_relative", "heating_nm", "heating_time_s", "bending_nm_s_rad", "bending_rad",
     "interpolation_rad", "interpolation_cycles", "wander_nm", "jitter_s",
 )  # fmt: skip
@@ -63,8 +63,9 @@ SETTINGS: tuple[str, ...] = (
     HYST, HYST_RAD, FLEX_DAMPING, KIN, KIN_CYCLES, KIN_PHASE, MODE, MODE_HZ, MODE_DAMPING,
     GRAVITY, GRAVITY_ANGLE, COG, COG_CYCLES, COG_PHASE, DELAY, LAG, LIMIT, RESOLUTION,
     ECC, ECC_PHASE, DRIFT, DRIFT_TIME, SLEW, DEADBAND, K_ASYM, RIPPLE, RIPPLE_CYCLES, RIPPLE_PHASE,
-    LOSS_FORWARD, LOSS_BACKWARD, STALL, NO_LOAD, SPRING, SPRING_REST, CABLE, CABLE_TIME,
-    EYRING, EYRING_V, EDDY, EDDY_V, AIR_SPRING, CUSHION, CUSHION_RAD,
+    LOSS_FORWARD, LOSS_BACKWARD, STALL, NO_LOAD, SPRING, SPRING_REST, SPRING_CUBE, CABLE,
+    CABLE_TIME,
+    EYRING, EYRING_V, EDDY, EDDY_V, CRANK, CRANK_CYCLES, CRANK_PHASE, CUSHION, CUSHION_RAD,
     HEATING, HEATING_NM, HEATING_TIME, BENDING, BENDING_RAD,
     INTERPOLATION, INTERPOLATION_CYCLES, WANDER, JITTER,
 ) = range(len(SETTINGS))  # fmt: skip
@@ -201,9 +202,23 @@ def outer_load(angle, cable, wander, s):
         across = math.cos(s[GRAVITY_ANGLE]) * math.sin(angle)
         torque -= s[GRAVITY] * (across + math.sin(s[GRAVITY_ANGLE]) * math.cos(angle))
     torque -= s[SPRING] * angle - s[SPRING] * s[SPRING_REST]
+    if s[SPRING_CUBE] != 0.0:
+        torque -= s[SPRING_CUBE] * (angle - s[SPRING_REST]) ** 3
     if s[CABLE] != 0.0:
         torque -= s[CABLE] * (angle - cable)
-    torque -= s[AIR_SPRING] * angle**3
     if s[CUSHION] != 0.0 and angle > s[CUSHION_RAD]:
         torque -= s[CUSHION] * (angle - s[CUSHION_RAD]) ** 2
     return torque
+
+
+@part
+def crank(inertia, angle, speed, s):
+    """Return inertia (kg m2) and torque (N m) of a body whose inertia varies with the angle.
+
+    Lagrange: J(q) q'' + J'(q) q'^2 / 2 is what drives it.
+    """
+    if s[CRANK] == 0.0:
+        return inertia, 0.0
+    at = s[CRANK_CYCLES] * angle + s[CRANK_PHASE]
+    slope = inertia * s[CRANK] * s[CRANK_CYCLES] * math.cos(at)
+    return inertia * (1.0 + s[CRANK] * math.sin(at)), -0.5 * slope * speed * speed

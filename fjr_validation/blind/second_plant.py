@@ -151,7 +151,8 @@ def _link_velocity(x, qm, te, p, s, h):
         elements = x[_LINK_SLIP:_MOTOR_SLIP]
         force -= law.slip_elements(elements, qm - x[Q_BEFORE], level, s[law.GMS_L])
         level = 0.0
-    return law.impulse(p[law.JL], x[V], force, viscous, level, level, h)
+    inertia, turned = law.crank(p[law.JL], qm, x[V], s)
+    return law.impulse(inertia, x[V], force + turned, viscous, level, level, h)
 
 
 @part
@@ -183,7 +184,11 @@ def _motor_velocity(x, thm, torque, te, lever, p, s, h):
         elements = x[_MOTOR_SLIP:_POSITIONS]
         force -= law.slip_elements(elements, thm - x[TH_BEFORE], level, s[law.GMS_M])
         plus = minus = 0.0
-    return law.impulse(p[law.JM], x[W], force, viscous, plus, minus, h)
+    inertia = p[law.JM]
+    if math.isinf(p[law.K0]):
+        inertia, turned = law.crank(inertia, thm, x[W], s)
+        force += turned
+    return law.impulse(inertia, x[W], force, viscous, plus, minus, h)
 
 
 @part

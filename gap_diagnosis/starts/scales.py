@@ -120,7 +120,7 @@ class Scales:
             "N m": self.torque_nm,
             "rad": self.deflection_rad if inner else self.angle_rad,
             "N m/rad": self.torque_nm / self.angle_rad,
-            "N m/rad3": self.torque_nm / self.deflection_rad**3,
+            "N m/rad3": self.torque_nm / (self.deflection_rad if inner else self.angle_rad) ** 3,
             "rad/N m": self.angle_rad / self.torque_nm,
             "rad/s": self.velocity_rad_s,
             "s": self.angle_rad / self.velocity_rad_s if part == "link" else self.period_s,

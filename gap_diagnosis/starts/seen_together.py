@@ -98,7 +98,9 @@ class Seen:
 
     @staticmethod
     def _loads(effects: Sequence[str]) -> list[str]:
-        return ["", *(load for load in LOADS if load in effects)]
+        """Return what may load the joint, nothing first; a law of parts goes with its parts."""
+        every = {*effects, *(holder for effect in effects for holder in fx.holders(effect))}
+        return ["", *(load for load in LOADS if load in every)]
 
     def _explaining(
         self, laws: Mapping[str, np.ndarray], effects: Sequence[str], shape: Mapping[str, float]

@@ -8,11 +8,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 
+from fjr_sim_node import effects as fx
+
 from ..fits.cell_fits import CellFitter
 from ..fits.comparison import CellFit
 from ..fits.gains import Gain, gain, stands_for
 from ..outcome.contender import Contender
-from ..which.equivalents import founded, partners
+from ..which.equivalents import founded, holders, partners
 from ..which.found import Found
 from .tested_causes import Tested
 
@@ -35,14 +37,17 @@ def _tied(fitter: CellFitter, found: Found, tested: Tested, names: Sequence[str]
     """Return fits in which an effect does as well in place of a cause, all else fitted anew.
 
     A near equivalent is in the set unless unseen parts tell it from the cause as surely as they
-    must show a cause at all.
+    must show a cause at all. A torque of the angle that holds the cause, or one like it, as a limit
+    case does as well by itself: it counts only where it surely does better.
     """
     best = found.best
     near = {*partners([tested.effect], set(names), fitter.nominal)}
-    others = sorted({*near, *found.alternatives.get(tested.effect, ())} - set(best.effects))
     tied, beside = [], tested.without.effects
+    angle = fx.EFFECTS[tested.effect].of_the_angle
+    whole = holders([tested.effect], names, beside) if angle else []
+    others = {*near, *found.alternatives.get(tested.effect, ())} - {*best.effects, *whole}
     searched = {fit.effects: fit for fits in found.rivals.values() for fit in fits}
-    for effect in founded(others, beside, fitter.nominal, names):
+    for effect in founded([*sorted(others), *whole], beside, fitter.nominal, names):
         other = searched.get((*beside, effect))
         if other is None:
             proposals = fitter.screening(tested.without, effect).proposals()
@@ -53,7 +58,11 @@ def _tied(fitter: CellFitter, found: Found, tested: Tested, names: Sequence[str]
             stands_for, fitter, best=best, first=tested.gain.mean, near=effect in near
         )
         further = other
-        if as_well(other) or as_well(further := fitter.further(other)):
+        if effect in whole:
+            does = gain(fitter, other, best).surely_present
+        else:
+            does = as_well(other) or as_well(further := fitter.further(other))
+        if does:
             tied.append(further)
     return tied
 

@@ -28,7 +28,8 @@ def holders(found: Sequence[str], among: Sequence[str], beside: Collection[str])
     """Return what holds one of some effects as a limit case and is not looked for by itself.
 
     A law of several parts, such as LuGre friction, is too costly to be tried on every rig, and not
-    needed where one of its parts does as well; where one leads, the whole may be what is there.
+    needed where one of its parts does as well; where one leads, the whole may be what is there. So
+    it may where another torque of the angle leads: gravity goes before a spring that hardens.
     Beside one of its parts it would name that one twice: there the other part is what is looked
     for.
 
@@ -37,7 +38,12 @@ def holders(found: Sequence[str], among: Sequence[str], beside: Collection[str])
         among: what is looked for; a law counts where all its parts are.
         beside: identifiers of the explanation to which it is to be added.
     """
-    every = {other for effect in found for other in fx.holders(effect)} - set(among)
+    leading = {*found}
+    for effect in found:
+        if fx.EFFECTS[effect].of_the_angle:
+            alike = fx.near_equivalents(effect)
+            leading |= {other for other in alike if fx.EFFECTS[other].of_the_angle}
+    every = {other for effect in leading for other in fx.holders(effect)} - set(among)
     parts = {law: set(fx.EFFECTS[law].contains) for law in every}
     return sorted(law for law in every if parts[law] <= set(among) - set(beside))
 

@@ -32,7 +32,7 @@ IDENTIFIERS = tuple(effects.EFFECTS)
 SIGNALS = ("position", "torque", "link", "motor")
 EVEN = {
     "asymmetric_friction", "torque_bias", "position_friction", "kinematic_error", "gravity",
-    "external_spring",
+    "external_spring", "hardening_spring",
     "cogging", "encoder_eccentricity", "asymmetric_stiffness", "torque_constant_ripple",
 }  # fmt: skip
 PASSIVE = set(IDENTIFIERS) - {
@@ -59,7 +59,7 @@ def odd_values(effect: effects.Effect) -> dict[str, float]:
 
 def test_every_effect_of_the_catalogue_is_tested_here():
     assert set(MODERATE) == set(IDENTIFIERS)
-    assert len(IDENTIFIERS) == 36
+    assert len(IDENTIFIERS) == 37
 
 
 @pytest.mark.parametrize("identifier", IDENTIFIERS)
@@ -190,7 +190,7 @@ def test_presliding_beside_another_friction_comes_to_rest_under_a_torque_below_i
 
 
 @pytest.mark.parametrize("identifier", ["kinematic_error", "extra_mode", "gravity", "cogging",
-                                        "external_spring",
+                                        "external_spring", "hardening_spring",
                                         "backlash", "piecewise_stiffness",
                                         "asymmetric_stiffness"])  # fmt: skip
 def test_conservative_effects_keep_the_energy_without_friction(identifier):
@@ -209,7 +209,7 @@ def test_conservative_effects_keep_the_energy_without_friction(identifier):
 STICKING = sorted(
     set(IDENTIFIERS)
     - {"presliding_friction", "lugre_friction", "torque_bias", "external_spring"}
-    - {"gravity", "cogging", "nonstationary"}
+    - {"gravity", "hardening_spring", "cogging", "nonstationary"}
 )
 
 

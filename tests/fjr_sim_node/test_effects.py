@@ -24,7 +24,7 @@ from paths import DOCS, ROOT
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.optimize import brentq
-from scipy.special import ellipk
+from scipy.special import ellipj, ellipk
 
 from fjr_kit.document_tables import in_step
 from fjr_sim_node import effects, plant
@@ -492,6 +492,34 @@ def test_a_spring_to_the_frame_is_gravity_of_small_travel():
         spring, weight, bare = (Rig(FRICTIONLESS | axis, e).play(torque)[:, 2] for e in on)
         assert 1e-3 < np.abs(spring).max() < 0.1
         assert np.abs(spring - weight).max() < 0.01 * np.abs(spring - bare).max()
+
+
+@pytest.mark.parametrize("swing", [0.5, 5.0])
+def test_a_spring_that_hardens_swings_the_free_link_as_jacobis_functions_do(swing):
+    """Duffing's equation, undamped: A cn(w t, m), J w^2 = k + c A^2, m = c A^2 / (2 J w^2)."""
+    k, c, rest = 7.0, 90.0, 0.2
+    on = named("hardening_spring", cubic_nm_rad3=c, stiffness_nm_rad=k, rest_rad=rest)
+    for axis, inertia, at in ((APART, J, 0), ({"k0": math.inf}, J + JM, 2)):
+        body = Rig({**axis, **FRICTIONLESS}, on).start(q=rest + swing, th=rest + swing)
+        before = body.energy()
+        rate = math.sqrt((k + c * swing**2) / inertia)
+        m = c * swing**2 / (2.0 * (k + c * swing**2))
+        held = np.full(60, 3.0 * 4.0 * ellipk(m) / rate / 60)  # three periods, in 60 samples
+        found = np.array([body.hold(0.0, float(h))[at] for h in held])
+        expected = rest + swing * ellipj(rate * np.cumsum(held), m)[1]
+        assert np.abs(found - expected).max() < 2e-4 * swing
+        assert body.energy() == pytest.approx(before, rel=2e-4)
+
+
+def test_a_spring_that_does_not_harden_is_the_linear_one():
+    torque = 20.0 * np.random.default_rng(5).standard_normal(300)
+    for axis in ({}, {"k0": math.inf}):
+        on = ("external_spring", {}), ("hardening_spring", {"cubic_nm_rad3": 0.0})
+        linear, hard = (
+            Rig(axis, named(name, stiffness_nm_rad=40.0, rest_rad=0.1, **more)).play(torque)
+            for name, more in on
+        )
+        np.testing.assert_allclose(linear, hard, rtol=1e-12, atol=1e-14)
 
 
 def test_a_cable_is_a_spring_behind_a_damper():

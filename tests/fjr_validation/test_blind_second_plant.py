@@ -239,6 +239,27 @@ def test_energy_of_the_free_undamped_plant_is_kept():
     assert late == pytest.approx(early, rel=0.02)
 
 
+def test_a_body_whose_inertia_varies_with_the_angle_keeps_its_energy():
+    """J(q) v^2 is constant after a push: it turns slower where its inertia is greater."""
+    free = {**NOMINAL, **dict.fromkeys(("fs", "fsm", "fv", "fvm"), 0.0), "k0": math.inf}
+    push = np.zeros(3000)
+    push[:5] = 0.05
+    crank = {"crank_relative": 0.4, "crank_cycles": 2000.0, "crank_phase_rad": 0.3}
+    how = second.Play(second.Loop.pd(p=200.0, d=0.0))
+    th = second.simulate(push, free, {"deadband_nm": 9.9, **crank}, how).th[100:]
+    v = np.gradient(th, 1e-3)[1:-1]
+    inertia = 1.0 + 0.4 * np.sin(2000.0 * th[1:-1] + 0.3)
+    assert 2000.0 * np.ptp(th) > 3.0 and np.ptp(v) > 0.3 * v.mean()
+    energy = inertia * v**2
+    assert np.ptp(energy) < 5e-3 * energy.mean()
+
+
+def test_a_spring_to_the_frame_pulls_by_its_angle_and_the_cube_of_that():
+    spring = settings_of(spring_nm_rad=2.0, spring_nm_rad3=50.0, spring_rest_rad=0.1)
+    pulled = law.outer_load(0.4, 0.0, 0.0, spring)
+    assert pulled == pytest.approx(-(2.0 * 0.3 + 50.0 * 0.3**3))
+
+
 def test_an_unknown_setting_is_refused():
     with pytest.raises(KeyError, match="half_gap"):
         second.simulate(np.zeros(10), NOMINAL, {"half_gap": 1.0})

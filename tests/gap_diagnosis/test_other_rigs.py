@@ -319,7 +319,7 @@ def test_what_an_effect_goes_with_stands_in_its_entry(monkeypatch, rig, goes_wit
 
 
 def test_loads_and_frictions_that_are_seen_together_are_those_of_the_table():
-    assert LOADS == ("torque_bias", "gravity", "external_spring")
+    assert LOADS == ("torque_bias", "gravity", "external_spring", "hardening_spring")
     assert LACKED == ("coulomb_friction", "viscous_friction")
     assert [name.split(".")[0] for name in LAWS] == [*LACKED, "quadratic_friction"]
     of_command = {e.identifier for e in effects.CATALOGUE if e.of_command}

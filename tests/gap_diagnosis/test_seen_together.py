@@ -101,11 +101,28 @@ def test_the_plainest_load_that_does_as_well_is_taken_and_none_where_there_is_no
     assert model.effects["external_spring.rest_rad"] == pytest.approx(0.2, rel=0.1)
 
 
+@pytest.mark.parametrize("stiffness", [0.0, 2.0])
+def test_a_spring_that_hardens_is_seen_where_a_linear_one_is_looked_for(stiffness):
+    def pull(q):
+        return -(stiffness + 3.0 * (q - 0.1) ** 2) * (q - 0.1)
+
+    hard = seen(0.1, 1.0, 0.5, load=pull, noise=0.05)
+    asked = [effect for effect in EVERY if effect != "hardening_spring"]
+    names, model = hard.together(asked)[0]
+    assert names[-1] == "hardening_spring"
+    assert model.effects["hardening_spring.cubic_nm_rad3"] == pytest.approx(3.0, rel=0.02)
+    assert model.effects["hardening_spring.stiffness_nm_rad"] == pytest.approx(stiffness, abs=0.1)
+    assert model.effects["hardening_spring.rest_rad"] == pytest.approx(0.1, abs=0.01)
+    without = [effect for effect in asked if effect != "external_spring"]
+    assert hard.together(without)[0][0][-1] != "hardening_spring"
+
+
 def test_one_cause_alone_and_what_pushes_are_left_to_the_usual_search():
     assert seen(0.1, viscous=0.5, noise=0.01).together(EVERY) == []
     assert seen(0.1, -1.0, 0.5, noise=0.01).together(("coulomb_friction", "viscous_friction")) == []
     assert seen(-2.5, 1.0, 0.5, noise=0.01).together(EVERY) == []  # no inertia would be left
     assert load_parameters("external_spring", [-1.0, 0.0]) is None
+    assert load_parameters("hardening_spring", [-1.0, 0.0, 1.0, 0.0]) is None
 
 
 def test_a_datasheet_lacks_a_friction_that_it_has_nowhere():
