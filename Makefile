@@ -23,8 +23,8 @@ PYTHON_VERSION := $(shell $(PYTHON) -c 'import sys; print("%d.%d" % sys.version_
 INSTALLED := $(VENV)/.installed-$(RCLPY)-python$(PYTHON_VERSION)
 PIP_INSTALL := $(BIN)/python -m pip install --quiet --use-pep517 --disable-pip-version-check
 
-# A sourced ROS 2 puts pytest plugins of its own on the path: load only ours.
-PYTEST := PYTEST_DISABLE_PLUGIN_AUTOLOAD=1 $(BIN)/python -m pytest -p xdist.plugin -p _hypothesis_pytestplugin
+# A sourced ROS 2 puts pytest plugins of its own on the path: load only ours. One thread of BLAS, as fjr has.
+PYTEST := OMP_NUM_THREADS=1 PYTEST_DISABLE_PLUGIN_AUTOLOAD=1 $(BIN)/python -m pytest -p xdist.plugin -p _hypothesis_pytestplugin
 
 COLCON := $(abspath $(BIN))/colcon --log-base log
 

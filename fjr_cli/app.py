@@ -12,6 +12,7 @@ unfolds. Modules that end in `_summary` print results.
 from __future__ import annotations
 
 import inspect
+import os
 from collections.abc import Callable
 from typing import Annotated
 
@@ -91,6 +92,10 @@ app.add_typer(blind, name="blind")
 
 
 def main() -> None:
-    """Run the command line."""
+    """Run the command line, with one thread of BLAS unless the environment asks for more.
+
+    Its matrices are small, so that the threads of BLAS take time from the simulations beside them.
+    """
+    os.environ.setdefault("OMP_NUM_THREADS", "1")  # read where numpy is imported, which is later
     outlive_readers()
     app(prog_name="fjr")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import json
+import os
 import re
 import subprocess
 import sys
@@ -67,6 +68,18 @@ def test_help_names_every_command_without_importing_numpy():
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert {"analyze", "import"} <= set(re.findall(r"[a-z]+", done.stdout))
     assert done.stdout.splitlines()[-1] == "[]"
+
+
+@pytest.mark.parametrize(("asked", "given"), [({}, "1"), ({"OMP_NUM_THREADS": "3"}, "3")])
+def test_blas_has_one_thread_unless_the_environment_asks_for_more(asked, given):
+    code = (
+        "import atexit, os, sys; sys.argv = ['fjr', '--version']; "
+        "atexit.register(lambda: print(os.environ['OMP_NUM_THREADS'])); "
+        "from fjr_cli.app import main; main()"
+    )
+    own = {n: v for n, v in os.environ.items() if n != "OMP_NUM_THREADS"} | asked
+    done = subprocess.run([sys.executable, "-c", code], env=own, capture_output=True, text=True)
+    assert done.returncode == 0 and done.stdout.splitlines()[-1] == given
 
 
 def test_help_breaks_its_paragraphs_at_the_width_of_the_terminal(run, monkeypatch):
