@@ -30,6 +30,10 @@
   (Maxwell slip), under a position loop whose targets are noise of 0.1 to 3 Hz: of a third of the
   way over which it yields, of one and a half, and of twenty. The force is logged with 0 to 3 % of
   noise that the table does not feel, at 1 kHz. Its law is not told.
+- `flexure`: a joint that flexures hold, whose stiffness grows with the square of its angle from
+  where it rests, under a position loop whose targets are slow sines, sweeps or sums of sines; its
+  flexures take a third to all of the loop's torque, beside Coulomb and viscous friction. Its law is
+  not told.
 
 Friction scatters by 2 % from run to run, beside a torque that wanders (not of `bristles`).
 """
@@ -61,6 +65,7 @@ SIZES = {
     "torque_bias.torque_nm": "bias",
     "cogging.amplitude_nm": "ripple",
     "dead_band.width_nm": "dead band",
+    "hardening_spring.cubic_nm_rad3": "cubic",
 }
 
 
@@ -106,7 +111,8 @@ class Machine:
 @numba.njit  # type: ignore[untyped-decorator]
 def moved(
     wanted, gain, integral, damping, late, angle, inertia, gravity, coulomb, viscous, quadratic,
-    breakaway, fallen, of_load, ripple, cycles, pushed, step, touch, rate_hz, often, inner,
+    breakaway, fallen, of_load, ripple, cycles, stiffness, cubic, rest, pushed, step, touch,
+    rate_hz, often, inner,
 ):  # fmt: skip
     """Return position, mean torque and speed.
 
@@ -135,7 +141,9 @@ def moved(
                 runs += 1
                 torque = waiting[runs % waiting.size]
             load = gravity * np.sin(angle)
+            bent = angle - rest
             held = load + ripple * np.sin(cycles * angle + 1.0)
+            held += (stiffness + cubic * bent * bent) * bent
             level = coulomb + breakaway * np.exp(-((speed / fallen) ** 2)) + of_load * abs(load)
             ends = touch if speed >= 0.0 else -touch
             bristle = ends + (bristle - ends) * np.exp(-abs(speed) * dt / touch)
@@ -160,6 +168,7 @@ def run_of(
         wanted, gain, integral, damping, late, angle, truth["inertia"], size("gravity", 0.0),
         share * truth["coulomb"], share * truth["viscous"], size("quadratic", 0.0),
         share * size("breakaway", 0.0), fallen, size("of load", 0.0), size("ripple", 0.0), cycles,
+        size("stiffness", 0.0), size("cubic", 0.0), size("rest", 0.0),
         wanders * truth["coulomb"] * wandering(rng, wanted.size, rate_hz) + size("bias", 0.0)
         + pushed, step, touch, rate_hz, often, inner,
     )  # fmt: skip
@@ -483,7 +492,41 @@ def bristles(rng: np.random.Generator) -> Machine:
     return Machine(truth, rate, runs, position="m")
 
 
+def flexure(rng: np.random.Generator) -> Machine:
+    """Draw a joint whose flexures harden."""
+    rate, seconds = float(rng.choice([200, 500, 1000])), float(rng.choice([10, 20]))
+    inertia, natural = 10.0 ** rng.uniform(-3, 0.5), 2.0 * np.pi * rng.uniform(1.5, 4)
+    widest, gain, damping = rng.uniform(0.3, 1.2), inertia * natural**2, 1.4 * inertia * natural
+    most, stamps, runs = gain * widest, np.arange(int(rate * seconds)) / rate, []
+    held = most * rng.uniform(0.3, 1.0)
+    truth = {
+        "inertia": inertia,
+        "coulomb": most * rng.uniform(0.01, 0.1),
+        "viscous": damping * rng.uniform(0.05, 0.4),
+        "stiffness": held / widest * float(rng.choice([0.0, 0.2, 0.6])),
+        "cubic": held / widest**3,
+        "rest": float(rng.choice([0.0, 1.0])) * rng.uniform(-0.3, 0.3) * widest,
+    }
+    kind = rng.integers(3)
+    for _ in range(rng.integers(2, 4)):
+        if kind == 0:
+            shape = np.sin(2.0 * np.pi * rng.uniform(0.2, 0.6) * stamps)
+        elif kind == 1:
+            shape = np.sin(2.0 * np.pi * (0.1 * stamps + 2.9 * stamps**2 / (2.0 * seconds)))
+        else:
+            hertz, phases = rng.uniform(0.1, 3.0, 8)[:, None], rng.uniform(0.0, 7.0, 8)[:, None]
+            shape = np.sin(2.0 * np.pi * hertz * stamps + phases).sum(axis=0)
+            shape /= np.abs(shape).max()
+        found = run_of(
+            truth, widest * rng.uniform(0.5, 1.0) * shape, rate, rng, 0.03, gain=gain,
+            damping=damping, step=2.0 * np.pi / 2**16, touch=1e-3,
+        )  # fmt: skip
+        runs.append(np.array([stamps, found[0], found[1]]))
+    return Machine(truth, rate, runs)
+
+
 KINDS: dict[str, Callable[[np.random.Generator], Machine]] = {
     "swing": swing, "stairs": stairs, "fan": fan, "leg": leg, "servo": servo,
     "stage": stage, "screw": screw, "motor": motor, "rotor": rotor, "bristles": bristles,
+    "flexure": flexure,
 }  # fmt: skip
