@@ -107,3 +107,5 @@ def test_effects_beside_one_another_agree():
 def test_what_cannot_stand_beside_another_is_refused():
     with pytest.raises(InputError, match="cannot express actuator_lag beside a limit of speed"):
         mujoco_model(joint_of(moderate("actuator_lag", "torque_speed_limit")))
+    with pytest.raises(InputError, match="cannot express hardening_spring beside external_spring"):
+        mujoco_model(joint_of(moderate("hardening_spring", "external_spring")))
